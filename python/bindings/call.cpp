@@ -1,8 +1,11 @@
 #include "call.hpp"
 
+#include <atomic>
 #include <chrono>
+#include <thread>
 
 #include <cxxabi.h>
+#include <pthread.h>
 #include <unistd.h>
 
 namespace palpate::python {
@@ -10,6 +13,21 @@ namespace palpate::python {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+std::atomic<int> working = 0;                ///< threads that run the library's work
+std::atomic<std::thread::id> ending_thread;  ///< none before the interpreter ends
+
+/// Once the interpreter ends, only the thread that ends it goes on.
+void begin_work() {
+  ++working;
+  const std::thread::id ending = ending_thread;
+  if (ending != std::thread::id() && ending != std::this_thread::get_id()) {
+    --working;
+    for (;;) {
+      ::pause();
+    }
+  }
+}
 
 /// Once the interpreter ends, CPython before 3.14 unwinds the stack of a daemon thread that asks
 /// for the GIL, which no noexcept function survives. Such a thread then waits here, as later
@@ -35,8 +53,14 @@ void now_and_then(Clock::time_point& next, F use) {
   }
   next = now + std::chrono::milliseconds(50);
   struct WithGil {
-    explicit WithGil(PyThreadState* state) { take_gil(state); }
-    ~WithGil() { PyEval_SaveThread(); }
+    explicit WithGil(PyThreadState* state) {
+      --working;
+      take_gil(state);
+    }
+    ~WithGil() {
+      PyEval_SaveThread();
+      begin_work();
+    }
   };
   const WithGil held(state);
   if (PyErr_CheckSignals() != 0) {
@@ -49,7 +73,24 @@ bool is_shown(const Progress& progress) { return progress.is_valid() && !progres
 
 }  // namespace
 
-WithoutGil::~WithoutGil() { take_gil(state_); }
+WithoutGil::WithoutGil() : state_(PyEval_SaveThread()) { begin_work(); }
+
+WithoutGil::~WithoutGil() {
+  --working;
+  take_gil(state_);
+}
+
+void await_calls_at_exit() {
+  // A child of fork() has none of its parent's other threads.
+  pthread_atfork(nullptr, nullptr, [] { working = 0; });
+  nb::module_::import_("atexit").attr("register")(nb::cpp_function([] {
+    ending_thread = std::this_thread::get_id();
+    const nb::gil_scoped_release released;
+    for (int ms = 0; working > 0 && ms < 10'000; ++ms) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }));
+}
 
 void check_signals() {
   thread_local Clock::time_point next;

@@ -12,7 +12,7 @@ namespace palpate::python {
 /// Leaves the GIL to other threads while it lives.
 class WithoutGil {
  public:
-  WithoutGil() : state_(PyEval_SaveThread()) {}
+  WithoutGil();
   ~WithoutGil();
   WithoutGil(const WithoutGil&) = delete;
   WithoutGil& operator=(const WithoutGil&) = delete;
@@ -20,6 +20,10 @@ class WithoutGil {
  private:
   PyThreadState* state_;
 };
+
+/// Registers with Python's atexit: calls of daemon threads stop at their next report or check, or
+/// return, before the process takes down what they use. Waits ten seconds for them at most.
+void await_calls_at_exit();
 
 /// For work without the GIL: has Python handle signals, about 20 times a second. Only the thread
 /// that Python called from does so, and of these the main thread alone has signals to handle.

@@ -1,6 +1,7 @@
 #include <nanobind/nanobind.h>
 
 #include "bindings.hpp"
+#include "call.hpp"
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
 
@@ -35,6 +36,7 @@ NB_MODULE(_palpate, module) {
   nb::set_leak_warnings(false);  // of what daemon threads hold at the end, or children of fork()
   module.doc() = "Bindings of libpalpate; import palpate instead.";
   add_error();
+  await_calls_at_exit();
   bind_model(module);
   bind_maps(module);
   bind_touches(module);

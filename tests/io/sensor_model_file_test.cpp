@@ -60,7 +60,7 @@ temperature: 31.5
 temperature_growth: 2.25
 bins: {x_mm: 0.5, y_mm: 0.25, theta_rad: 0.125}
 fit_scale: {mean: -4.5, sd: 12.25, shared_sd: 0.5, alone: {mean: 1.5, sd: 0.75}, )"
-    R"(stranger_sd: 3.25, stranger_single_touch: {mean: -4.25, sd: 2.75}, )"
+    R"(stranger_sd: 3.25, stranger_alone: {mean: -4.25, sd: 2.75}, )"
     R"(array: {elements: 36, spacing_mm: 1.875}}
 pose_scale: {factor: 1.25, map_sd_mm: 0.375}
 features:
@@ -148,7 +148,7 @@ TEST_F(SensorModelFile, NamesTheKeyThatIsWrong) {
         {"shared_sd: 0.5", "shared_sd: -1", "fit_scale: shared_sd"},
         {"mean: 1.5, sd: 0.75", "mean: 1.5, sd: 0", "fit_scale: alone: sd"},
         {"stranger_sd: 3.25", "stranger_sd: 0", "fit_scale: stranger_sd"},
-        {"mean: -4.25, sd: 2.75", "mean: -4.25, sd: 0.5", "fit_scale: stranger_single_touch: sd"},
+        {"mean: -4.25, sd: 2.75", "mean: -4.25, sd: 0.5", "fit_scale: stranger_alone: sd"},
         {"noise: 0.25", "psf_mm: 1", "psf_mm", "remove it"},
         {"noise: 0.25", "familiarity: {offset: 1}", "familiarity", "remove it"},
         {"raw", "psi", "pressure_unit", "kPa or raw"}}) {
