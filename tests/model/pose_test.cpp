@@ -19,8 +19,8 @@ namespace palpate::pose_test {
 
 constexpr double pi = std::numbers::pi;
 
-// Coordinates of a few hundred mm lose about 1e-13 mm to each rotation in float64, those below 1e4 mm
-// some 1e-12.
+// Coordinates of a few hundred mm lose about 1e-13 mm to each rotation in float64, those below 1e4
+// mm some 1e-12.
 constexpr double rounding = 1e-11;
 
 std::vector<Pose> some_poses(double most_mm, double most_rad) {
