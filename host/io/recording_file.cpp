@@ -57,7 +57,8 @@ std::vector<SetupFinding> read_findings(const Hdf5Contents& file) {
 template <typename Tuple>
 void read_tuples(const Hdf5Contents& file, const char* name, std::uint64_t first,
                  std::uint64_t count, std::vector<Tuple>& tuples) {
-  constexpr std::size_t width = sizeof(Tuple) / sizeof(double);
+  constexpr std::size_t number_bytes = sizeof(double);
+  constexpr std::size_t width = sizeof(Tuple) / number_bytes;
   tuples.clear();
   tuples.reserve(file.size(name, first, count) / width);
   const auto take = [&](std::uint64_t, std::span<const double> numbers) {

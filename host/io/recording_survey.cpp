@@ -58,8 +58,8 @@ class Survey {
       }
     }
     std::ranges::sort(touches_);
-    const auto repeated = std::ranges::unique(touches_);
-    result_.repeated = repeated.size();
+    const auto repeated = std::unique(touches_.begin(), touches_.end());
+    result_.repeated = static_cast<std::uint64_t>(touches_.end() - repeated);
     return std::move(result_);
   }
 
