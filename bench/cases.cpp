@@ -83,9 +83,9 @@ std::pair<double, double> command_seconds(const Inputs& inputs,
   }
 
   const auto seconds_of_command = [&](const std::string& arguments) {
-    const std::string command = fmt::format(
-        "'{}' {} --maps '{}' --bins 25x25x16 --x-mm=-10:10 --y-mm=-10:10 --device '{}' >/dev/null",
-        program.string(), arguments, (folder / "maps").string(), inputs.device.name());
+    const std::string command =
+        fmt::format("'{}' {} --maps '{}' --bins 25x25x16 --x-mm=-10:10 --y-mm=-10:10 >/dev/null",
+                    program.string(), arguments, (folder / "maps").string());
     return seconds_of([&] {
       if (std::system(command.c_str()) != 0) {
         throw Error(Fault::system, fmt::format("{}: failed; run it by hand", command));
@@ -94,7 +94,8 @@ std::pair<double, double> command_seconds(const Inputs& inputs,
   };
   std::vector<double> each;
   for (std::size_t i = 0; i < (inputs.quick ? 3 : 10); ++i) {
-    each.push_back(seconds_of_command(fmt::format("recognize '{}'", recording(i).string())));
+    each.push_back(seconds_of_command(fmt::format("recognize '{}' --filter histogram --device '{}'",
+                                                  recording(i).string(), inputs.device.name())));
   }
   std::vector<double> batch;
   for (int run = 0; run < (inputs.quick ? 1 : 5); ++run) {
