@@ -2,15 +2,16 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cmath>
+#include <future>
 #include <numbers>
 #include <numeric>
+#include <thread>
 
 #include <fmt/format.h>
-#include <tbb/enumerable_thread_specific.h>
 
-#include "estimation/parallel_for.hpp"
 #include "model/contact_readings.hpp"
 #include "model/displacement_points.hpp"
 #include "model/random.hpp"
@@ -344,10 +345,26 @@ std::vector<TouchGain> expected_gain(const PredictedReadings& predicted,
   const SampledBelief belief(samples, elements_mm.size(), touch_sd, options);
   std::vector<TouchGain> gains(T_robot_sensor.size());
   // Candidates do not depend on each other: the number of threads changes no bit.
-  tbb::enumerable_thread_specific<GainEstimator> estimators(
-      [&] { return GainEstimator(predicted, belief, elements_mm); });
-  parallel_for(gains.size(),
-               [&](std::size_t i) { gains[i] = estimators.local().gain(T_robot_sensor[i]); });
+  constexpr std::size_t fewest_candidates = 8;  // that are worth a thread
+  const std::size_t threads =
+      std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1,
+                              (gains.size() + fewest_candidates - 1) / fewest_candidates);
+  std::atomic<std::size_t> next = 0;
+  const auto work = [&] {
+    GainEstimator estimator(predicted, belief, elements_mm);
+    for (std::size_t i = next++; i < gains.size(); i = next++) {
+      gains[i] = estimator.gain(T_robot_sensor[i]);
+    }
+  };
+  // Not oneTBB's threads, whose synchronisation ThreadSanitizer does not see.
+  std::vector<std::future<void>> others;
+  for (std::size_t i = 1; i < threads; ++i) {
+    others.push_back(std::async(std::launch::async, work));
+  }
+  work();
+  for (std::future<void>& other : others) {
+    other.get();
+  }
   return gains;
 }
 
