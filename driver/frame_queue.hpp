@@ -91,8 +91,9 @@ class FrameQueue {
   Counters counters_;
 };
 
-/// A sensor whose thread reads a board, between start() and stop(), and passes frames to next()
-/// through a queue. Only that thread uses push() and publish() meanwhile.
+/// A sensor whose thread reads a board between start() and stop() and passes frames to next()
+/// through a queue. Meanwhile only that thread uses lose(), push() and publish(). The destructor of
+/// a derived class must call stop().
 class QueuedSensor : public Sensor {
  public:
   QueuedSensor() = default;

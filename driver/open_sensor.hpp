@@ -8,7 +8,8 @@
 
 namespace palpate {
 
-/// Reads what a TakkTile tells without disturbing a program that uses it. @throws Error
+/// Opens a TakkTile, without claiming its interface, and reads what it tells of itself.
+/// @throws Error
 SensorDescription describe_takktile(const ListedDevice& device);
 
 /// Opens a TakkTile. @param which its serial number or port; "" if only one is plugged in

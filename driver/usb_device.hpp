@@ -54,7 +54,8 @@ class UsbHandle {
   /// Claims the interface. A kernel driver that holds it is detached until the handle is destroyed.
   void claim(int interface);
 
-  /// Asks the device a request of its vendor's; returns its reply, at most so long.
+  /// Sends the device a request that its vendor defines; returns the reply, at most `length` bytes.
+  /// @throws Error where the device fails
   std::vector<std::uint8_t> control_in(std::uint8_t request, std::uint16_t length,
                                        std::uint16_t value = 0, std::uint16_t index = 0);
   void clear_halt(std::uint8_t endpoint);

@@ -183,11 +183,31 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
   // Checked before the file is opened: a file closed by now is read as a whole.
   closed_ = !is_marked_open(path);
   const ConfinedSession session(path);
-  if (H5Fis_hdf5(path.c_str()) <= 0) {
+  try {
+    open_fields(attributes, datasets);
+  } catch (...) {
+    close();  // within the session, which ends before the members do
+    throw;
+  }
+}
+
+Hdf5Contents::~Hdf5Contents() {
+  const ConfinedSession session(path_);
+  close();
+}
+
+void Hdf5Contents::close() {
+  datasets_.clear();
+  file_ = Hdf5Handle(H5I_INVALID_HID, H5Fclose);
+}
+
+void Hdf5Contents::open_fields(const std::vector<std::string>& attributes,
+                               const std::vector<std::string>& datasets) {
+  if (H5Fis_hdf5(path_.c_str()) <= 0) {
     refuse("is not an HDF5 file; give a file that Palpate or h5py wrote");
   }
   std::string reason;
-  file_ = open_file(path, reason);
+  file_ = open_file(path_, reason);
   if (!file_.valid()) {
     refuse("{}", open_fault(reason));
   }
@@ -195,21 +215,15 @@ Hdf5Contents::Hdf5Contents(const std::filesystem::path& path,
     if (H5Aexists(file_.get(), name.c_str()) != 0) {
       const Hdf5Handle attribute(H5Aopen(file_.get(), name.c_str(), H5P_DEFAULT), H5Aclose);
       Attribute& value = attributes_[name];
-      value.fault = read_attribute(attribute.get(), size_of(path), value);
+      value.fault = read_attribute(attribute.get(), size_of(path_), value);
     }
   }
   for (const std::string& name : datasets) {
     if (H5Lexists(file_.get(), name.c_str(), H5P_DEFAULT) != 0) {
       Dataset& dataset = datasets_[name];
-      dataset.fault = open(name, size_of(path), dataset);
+      dataset.fault = open(name, size_of(path_), dataset);
     }
   }
-}
-
-Hdf5Contents::~Hdf5Contents() {
-  const ConfinedSession session(path_);
-  datasets_.clear();
-  file_ = Hdf5Handle(H5I_INVALID_HID, H5Fclose);
 }
 
 std::string Hdf5Contents::read_attribute(hid_t attribute, std::uint64_t file_bytes,
@@ -335,9 +349,10 @@ const std::vector<std::uint64_t>& Hdf5Contents::shape(const std::string& name,
 std::uint64_t Hdf5Contents::size(const std::string& name, std::uint64_t first_row,
                                  std::uint64_t rows) const {
   std::vector<std::uint64_t> extents = shape(name);
-  if (!extents.empty()) {
-    extents[0] = std::min(rows, extents[0] - std::min(first_row, extents[0]));
+  if (extents.empty()) {
+    extents.push_back(1);  // one number is a row
   }
+  extents[0] = std::min(rows, extents[0] - std::min(first_row, extents[0]));
   return stored_bytes(extents, 1);
 }
 

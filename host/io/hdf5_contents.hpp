@@ -57,13 +57,13 @@ class Hdf5Contents {
   /// Returns the shape of a dataset of numbers; throws Error where it has not `rank` dimensions.
   const std::vector<std::uint64_t>& shape(const std::string& dataset,
                                           std::optional<std::size_t> rank = {}) const;
-  /// Numbers in so many rows of the dataset, or in all that follow, from one on.
+  /// How many numbers `rows` rows from `first_row` on hold; rows behind the last do not count.
   std::uint64_t size(const std::string& dataset, std::uint64_t first_row = 0,
                      std::uint64_t rows = UINT64_MAX) const;
-  /// Reads these rows.
+  /// Reads the numbers of these rows in pieces.
   void read(const std::string& dataset, const Take& take, std::uint64_t first_row = 0,
             std::uint64_t rows = UINT64_MAX) const;
-  /// Returns these rows' numbers.
+  /// Returns the numbers of these rows.
   template <typename Number>
   std::vector<Number> read(const std::string& dataset, std::uint64_t first_row = 0,
                            std::uint64_t rows = UINT64_MAX) const {
@@ -98,7 +98,10 @@ class Hdf5Contents {
     std::uint64_t band_bytes = 0;  ///< of the chunks that a pass over the rows holds at once
   };
 
-  // Return the field's problem.
+  void open_fields(const std::vector<std::string>& attributes,
+                   const std::vector<std::string>& datasets);
+  void close();
+  // Return the field's fault; "" where it can be read.
   static std::string read_attribute(hid_t attribute, std::uint64_t file_bytes, Attribute& value);
   std::string open(const std::string& name, std::uint64_t file_bytes, Dataset& dataset) const;
   std::string reopen_with_cache(const std::string& name, hid_t creation, std::size_t width,

@@ -172,7 +172,10 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
         "or name it by `time-column`");
   }
   PressureTable all;
-  all.pressure.reserve(table.count_lines());  // of as many readings, where none is left out
+  if (options.where.empty()) {
+    // At least as many readings as rows; the vector grows where frames lack elements.
+    all.pressure.reserve(table.count_lines());
+  }
   const std::string remedy =
       fmt::format("is no element; the array has {}, counted from 0", elements);
   double last = before_all;

@@ -235,14 +235,18 @@ std::vector<std::uint64_t> RecordingFile::counts(std::uint64_t first, std::uint6
   if (!file_->has_dataset("lost_before")) {
     return counts;
   }
-  for (const double value : file_->read<double>("lost_before", first, count)) {
-    if (!(value >= 0.0 && value <= static_cast<double>(largest_count) &&
-          value == std::floor(value))) {
-      file_->refuse("dataset 'lost_before' holds {}; store counts of frames up to {}", value,
-                    largest_count);
+  counts.reserve(file_->size("lost_before", first, count));
+  const auto take = [&](std::uint64_t, std::span<const double> values) {
+    for (const double value : values) {
+      if (!(value >= 0.0 && value <= static_cast<double>(largest_count) &&
+            value == std::floor(value))) {
+        file_->refuse("dataset 'lost_before' holds {}; store counts of frames up to {}", value,
+                      largest_count);
+      }
+      counts.push_back(static_cast<std::uint64_t>(value));
     }
-    counts.push_back(static_cast<std::uint64_t>(value));
-  }
+  };
+  file_->read("lost_before", take, first, count);
   return counts;
 }
 

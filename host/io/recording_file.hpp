@@ -21,7 +21,7 @@ struct RecordingHead {
   bool array_changes = false;  ///< `elements` is [n, e, 2]
 };
 
-/// An open "palpate.recording" HDF5 file, which is read and checked as Hdf5Contents does.
+/// An open "palpate.recording" HDF5 file. It is read and checked as by Hdf5Contents.
 class RecordingFile {
  public:
   /// Reads the head. @throws Error as read_recording() does
@@ -29,8 +29,8 @@ class RecordingFile {
   ~RecordingFile();
 
   const RecordingHead& head() const { return head_; }
-  /// Reads rows into those of `rows`: pressures, poses, times, lost counts and, where the array
-  /// changes, elements. @throws Error as read_recording() does
+  /// Replaces in `rows` the pressures, poses, times, lost counts and, where the array changes,
+  /// elements by those of `count` rows from `first` on. @throws Error as read_recording() does
   void read(std::uint64_t first, std::uint64_t count, Recording& rows) const;
 
  private:

@@ -28,7 +28,7 @@ std::uint64_t digest_with(std::uint64_t digest, double number) {
   return digest ^ (digest >> 31);
 }
 
-// Numbers of a block of rows that are held at a time: 4 MiB.
+// Numbers that the rows held at a time have at most, unless one row has more: 4 MiB.
 constexpr std::uint64_t block = 1 << 19;
 
 class Survey {
@@ -43,7 +43,9 @@ class Survey {
     result_.pressure.elements.resize(e_);
     take_places(0, head_.elements_mm);
     Recording rows;
-    const std::uint64_t at_once = std::max<std::uint64_t>(1, block / e_);
+    // A row has e pressures, the places of e elements where they change, a pose, two times and a
+    // count of lost frames.
+    const std::uint64_t at_once = std::max<std::uint64_t>(1, block / (3 * e_ + 6));
     for (std::uint64_t first = 0; first < file_.head().rows; first += at_once) {
       file_.read(first, std::min(at_once, file_.head().rows - first), rows);
       take_places(first, rows.elements_mm);

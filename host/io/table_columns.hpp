@@ -33,30 +33,36 @@ inline constexpr std::array<Unit, 2> angle_units{{{"rad"}, {"deg", std::numbers:
 
 /// What the options say about the columns, rows and units of tables; "" where one is not given.
 struct TableOptions {
-  std::uint64_t header_line = 0;   ///< of the table, from 1; 0: found
-  std::vector<std::string> where;  ///< COLUMN=VALUE: rows whose cells hold it, if it has the column
-  std::string time_column;         ///< "": the usual names
-  std::string pressure_columns;    ///< see choose_columns(); "": all that are left
-  std::string pressure_component;  ///< of elements that read three axes: "z", or "norm", the length
-  std::string pose_columns;        ///< see choose_columns(); "": the usual names
-  bool may_name_poses = true;      ///< there is an option `pose-columns`
+  /// Of the table (of an import: of the pressures), from 1; 0: found.
+  std::uint64_t header_line = 0;
+  /// COLUMN=VALUE: of a table with this column, only rows with this value.
+  std::vector<std::string> where;
+  std::string time_column;       ///< "": the usual names
+  std::string pressure_columns;  ///< see choose_columns(); "": all that are left
+  /// Of elements that read three axes: "z", or "norm", the length of the vector.
+  std::string pressure_component;
+  std::string pose_columns;    ///< see choose_columns(); "": the usual names
+  bool may_name_poses = true;  ///< set by the caller: there is an option `pose-columns`
   /// Axes about which three angles turn one after another: "xyz" fixed ones, "ZYX" moving ones, as
   /// SciPy has them; "vector": they are a rotation vector; "": roll, pitch and yaw about xyz.
   std::string euler;
   std::string matrix;     ///< how a matrix is written: "columns" or "rows"; "": found
   std::string time_unit;  ///< "s", "ms", "us" or "ns"; "": by the column's name, else s
   std::string pose_unit;  ///< such as "m,deg"; "": by the columns' names, else mm and rad
-  std::optional<std::array<std::size_t, 2>> grid = {};  ///< columns and rows of the array
-  bool has_blocks = false;  ///< each frame may be a block of rows, as the array has them
+  /// Set by import_tables(): columns and rows of the array.
+  std::optional<std::array<std::size_t, 2>> grid = {};
+  /// Set by import_tables(): each frame may be a block of rows, as the array has them.
+  bool has_blocks = false;
 };
 
 /// @throws Error naming the option whose value makes no sense
 void validate(const TableOptions& options);
 
-/// The unit that the options give for columns that have one of these units.
+/// The unit that the options give for times, lengths or angles, whichever `units` (time_units,
+/// length_units or angle_units: compared by address) are; none where they give none.
 std::optional<Unit> given_unit(const TableOptions& options, std::span<const Unit> units);
 
-/// The columns, and what their cells must be, that `where` names.
+/// `where` as pairs of a column and the value that its cells must have; call validate() first.
 std::vector<std::pair<std::string, std::string>> conditions(const TableOptions& options);
 
 /// Opens a table with the options' header line, and passes over the rows that `where` leaves out.
@@ -72,7 +78,8 @@ struct UnitColumn {
   bool assumed = false;  ///< neither the name nor an option gives the unit
 };
 
-/// The column of this number, whose unit is that of its name, of the options, or the first.
+/// The column of this index with its unit: by its name, else by the options, else the first of
+/// `units`.
 /// @throws Error where the column's name and the options differ
 UnitColumn unit_column(const CsvTable& table, std::size_t index, std::span<const Unit> units,
                        const TableOptions& options);

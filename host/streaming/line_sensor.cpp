@@ -45,7 +45,7 @@ std::optional<Frame> LineSensor::next(std::chrono::milliseconds timeout) {
       throw Error(
           Fault::input,
           before_ > 0
-              ? finding_before_
+              ? flaw_before_
               : fmt::format("{} ended before the first frame; write frames to it, a line each",
                             reader_.name()));
     }
@@ -59,23 +59,23 @@ std::optional<Frame> LineSensor::next(std::chrono::milliseconds timeout) {
 }
 
 void LineSensor::take(const LineReader::Line& line) {
-  using Kind = FrameLines::Finding::Kind;
+  using Kind = FrameLines::Flaw::Kind;
   if (line.too_long) {
     refuse_line(line, Kind::malformed, "is longer than any frame");
     return;
   }
   const double read_s = host_clock_s();
   auto read = format_.read(line.text, read_s);
-  if (std::holds_alternative<FrameLines::Finding>(read) && counters_.frames == 0) {
+  if (std::holds_alternative<FrameLines::Flaw>(read) && counters_.frames == 0) {
     format_ = FrameLines(format_.elements());  // what looked like a header was a greeting
     if (std::exchange(has_header_, false)) {
       ++before_;
       read = format_.read(line.text, read_s);
     }
   }
-  if (const auto* finding = std::get_if<FrameLines::Finding>(&read)) {
-    if (!may_stand_before(line, finding->words)) {
-      refuse_line(line, finding->kind, finding->words);
+  if (const auto* flaw = std::get_if<FrameLines::Flaw>(&read)) {
+    if (!may_stand_before(line, flaw->words)) {
+      refuse_line(line, flaw->kind, flaw->words);
     }
   } else if (auto* frame = std::get_if<Frame>(&read)) {
     say_first(read_s, frame->host_time_s);
@@ -91,7 +91,7 @@ void LineSensor::take(const LineReader::Line& line) {
 }
 
 /// Leaves out a line before the first frame that a board prints as it starts.
-bool LineSensor::may_stand_before(const LineReader::Line& line, const std::string& finding) {
+bool LineSensor::may_stand_before(const LineReader::Line& line, const std::string& flaw) {
   constexpr std::uint64_t limit = 100;
   const bool is_cut = line.number == 1 && !trimmed(line.text).starts_with('{');
   if (counters_.frames > 0 || before_ == limit || !(is_cut || FrameLines::is_text(line.text))) {
@@ -101,7 +101,7 @@ bool LineSensor::may_stand_before(const LineReader::Line& line, const std::strin
   if (before_++ == 0) {
     constexpr std::size_t enough = 60;
     first_before_ = printable(trimmed(line.text).substr(0, enough));
-    finding_before_ = words_about(line, finding);
+    flaw_before_ = words_about(line, flaw);
   }
   return true;
 }
@@ -141,17 +141,16 @@ void LineSensor::say_first(double now_s, double time_s) {
   }
 }
 
-std::string LineSensor::words_about(const LineReader::Line& line,
-                                    const std::string& finding) const {
+std::string LineSensor::words_about(const LineReader::Line& line, const std::string& flaw) const {
   return fmt::format(
       "{}, line {}: {}; write {{\"time\": s, \"pressure\": [{} numbers]}}, or CSV with {} "
       "readings, behind their time where it is known",
-      reader_.name(), line.number, finding, format_.elements(), format_.elements());
+      reader_.name(), line.number, flaw, format_.elements(), format_.elements());
 }
 
-void LineSensor::refuse_line(const LineReader::Line& line, FrameLines::Finding::Kind kind,
-                             const std::string& finding) {
-  const std::string text = words_about(line, finding);
+void LineSensor::refuse_line(const LineReader::Line& line, FrameLines::Flaw::Kind kind,
+                             const std::string& flaw) {
+  const std::string text = words_about(line, flaw);
   if (counters_.frames == 0) {
     throw Error(Fault::input, text);
   }

@@ -36,11 +36,11 @@ class LineSensor : public Sensor {
 
  private:
   void take(const LineReader::Line& line);
-  bool may_stand_before(const LineReader::Line& line, const std::string& finding);
-  std::string words_about(const LineReader::Line& line, const std::string& finding) const;
+  bool may_stand_before(const LineReader::Line& line, const std::string& flaw);
+  std::string words_about(const LineReader::Line& line, const std::string& flaw) const;
   void say_first(double now_s, double time_s);
-  void refuse_line(const LineReader::Line& line, FrameLines::Finding::Kind kind,
-                   const std::string& finding);
+  void refuse_line(const LineReader::Line& line, FrameLines::Flaw::Kind kind,
+                   const std::string& flaw);
 
   SensorDescription description_;
   PosedSensor::Warn warn_;
@@ -51,7 +51,7 @@ class LineSensor : public Sensor {
   bool has_header_ = false;        ///< no frame has come since the header
   std::uint64_t before_ = 0;       ///< lines left out before the first frame
   std::string first_before_;       ///< the first of them
-  std::string finding_before_;     ///< why it is no frame
+  std::string flaw_before_;        ///< why it is no frame
   std::vector<double> first_s_;    ///< times of the first frames, of those that have one
   std::uint64_t lost_before_ = 0;  ///< lines refused since the last frame
   std::uint64_t refused_ = 0;

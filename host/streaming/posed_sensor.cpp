@@ -59,7 +59,15 @@ class PoseReader {
 
  private:
   /// What may be wrong with a line.
-  enum class Flaw { too_long, no_pose, no_number, far_away, out_of_order, clock_set_back, kinds };
+  enum class LineFlaw {
+    too_long,
+    no_pose,
+    no_number,
+    far_away,
+    out_of_order,
+    clock_set_back,
+    kinds
+  };
 
   // Reads one block; false where there is none, or none yet.
   bool read_some() {
@@ -75,16 +83,16 @@ class PoseReader {
   void take(const LineReader::Line& line) {
     line_ = line.number;
     if (line.too_long) {
-      refuse_line(Flaw::too_long, line_, "is longer than any pose");
+      refuse_line(LineFlaw::too_long, line_, "is longer than any pose");
       return;
     }
     const auto read = format_.read(line.text, 0.0);
-    if (const auto* finding = std::get_if<FrameLines::Finding>(&read)) {
-      using Kind = FrameLines::Finding::Kind;
-      refuse_line(finding->kind == Kind::malformed   ? Flaw::no_pose
-                  : finding->kind == Kind::no_number ? Flaw::no_number
-                                                     : Flaw::far_away,
-                  line_, finding->words);
+    if (const auto* flaw = std::get_if<FrameLines::Flaw>(&read)) {
+      using Kind = FrameLines::Flaw::Kind;
+      refuse_line(flaw->kind == Kind::malformed   ? LineFlaw::no_pose
+                  : flaw->kind == Kind::no_number ? LineFlaw::no_number
+                                                  : LineFlaw::far_away,
+                  line_, flaw->words);
     } else if (const auto* frame = std::get_if<Frame>(&read)) {
       add(frame->host_time_s, *frame->T_robot_sensor);
     }
@@ -106,31 +114,31 @@ class PoseReader {
   void judge_order(std::uint64_t dropped_before, std::uint64_t set_back_before) {
     const bool early = aside_.time_s <= aside_.before_s;
     if (track_.dropped() != dropped_before) {
-      refuse_line(Flaw::out_of_order, aside_.line,
+      refuse_line(LineFlaw::out_of_order, aside_.line,
                   fmt::format("time = {} s is {} the poses around it, at {} s", aside_.time_s,
                               early ? "not later than" : "far later than", aside_.before_s));
     }
     if (track_.set_back() != set_back_before) {
-      const std::string finding = fmt::format(
+      const std::string words = fmt::format(
           "time = {} s is not later than the pose before, at {} s, and the poses after "
           "it go on from there: the robot's clock was set",
           aside_.time_s, aside_.before_s);
-      refuse_line(Flaw::clock_set_back, aside_.line, finding);
+      refuse_line(LineFlaw::clock_set_back, aside_.line, words);
     }
   }
 
-  void refuse_line(Flaw flaw, std::uint64_t line, std::string_view finding) {
+  void refuse_line(LineFlaw flaw, std::uint64_t line, std::string_view words) {
     const std::string text = fmt::format(
         "{}, line {}: {}; write {{\"time\": s, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}}, "
         "or CSV "
         "with these columns",
-        lines_.name(), line, finding);
+        lines_.name(), line, words);
     if (is_file()) {
       throw Error(Fault::input, text);
     }
-    malformed_ += flaw < Flaw::out_of_order ? 1 : 0;  // the track counts the others
+    malformed_ += flaw < LineFlaw::out_of_order ? 1 : 0;  // the track counts the others
     if (first_refused_.empty() &&
-        flaw != Flaw::clock_set_back) {  // those poses have joined the track
+        flaw != LineFlaw::clock_set_back) {  // those poses have joined the track
       first_refused_ = text;
     }
     const auto kind = static_cast<std::size_t>(flaw);
@@ -149,7 +157,7 @@ class PoseReader {
   std::uint64_t poses_ = 0;      ///< lines handed to the track
   std::uint64_t malformed_ = 0;  ///< lines that hold no pose
   std::string first_refused_;
-  std::bitset<static_cast<std::size_t>(Flaw::kinds)> told_;
+  std::bitset<static_cast<std::size_t>(LineFlaw::kinds)> told_;
 
   /// The first of the poses that the track has set aside.
   struct {

@@ -13,6 +13,17 @@ namespace palpate {
 
 namespace {
 
+constexpr double near_middle_mm = 0.25;
+constexpr double still_mm = 0.05;
+// Of an array that stands still in its stroke.
+constexpr std::size_t most_frames = 10'000;
+// A part whose halves take times that differ by more begins or ends a movement.
+constexpr double steady_ratio = 2.0;
+
+double distance_mm(const Pose& a, const Pose& b) {
+  return glm::distance(a.translation_mm, b.translation_mm);
+}
+
 // Returns the mean of the middle half; values at its borders count in part. Reorders the values. It
 // averages Gaussian noise with 84 % of the mean's efficiency (the median: 64 %) and, unlike the
 // median, resolves less than a step of the sensor's converter.
@@ -26,17 +37,6 @@ double interquartile_mean(std::span<double> values) {
     sum += std::max(part, 0.0) * values[i];
   }
   return sum / (0.5 * n);
-}
-
-constexpr double near_middle_mm = 0.25;
-constexpr double still_mm = 0.05;
-// Of an array that stands still in its stroke.
-constexpr std::size_t most_frames = 10'000;
-// A part whose halves take times that differ by more begins or ends a movement.
-constexpr double steady_ratio = 2.0;
-
-double distance_mm(const Pose& a, const Pose& b) {
-  return glm::distance(a.translation_mm, b.translation_mm);
 }
 
 }  // namespace

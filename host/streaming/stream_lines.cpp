@@ -23,11 +23,8 @@ namespace palpate {
 
 namespace {
 
-using Kind = FrameLines::Finding::Kind;
+using Kind = FrameLines::Flaw::Kind;
 
-// What a column holds beside the numbers that have names.
-constexpr std::size_t reading = 4;
-constexpr std::size_t left_out = 5;
 constexpr double unknown_reading_number = std::numeric_limits<double>::quiet_NaN();
 
 bool is_json(std::string_view text) { return text.starts_with('{') || text.starts_with('['); }
@@ -149,7 +146,8 @@ FrameLines::Line FrameLines::read(std::string_view line, double now_s) {
     line.remove_prefix(byte_order_mark.size());
   }
   const std::string_view text = trimmed(line);
-  return is_json(text) ? read_json(text, now_s) : read_csv(line, now_s);
+  const bool is_first = std::exchange(is_first_, false);
+  return is_json(text) ? read_json(text, now_s) : read_csv(line, is_first, now_s);
 }
 
 FrameLines::Line FrameLines::read_json(std::string_view line, double now_s) const {
@@ -157,11 +155,11 @@ FrameLines::Line FrameLines::read_json(std::string_view line, double now_s) cons
   if (json.is_discarded()) {
     json = nlohmann::json::parse(without_nan(line), nullptr, false);
   }
-  if (elements_ == 0 && !json.is_object()) {
-    return Finding{Kind::malformed, "is no JSON object"};
+  if (of_poses() && !json.is_object()) {
+    return Flaw{Kind::malformed, "is no JSON object"};
   }
   if (json.is_discarded()) {
-    return Finding{Kind::malformed, "is no whole JSON"};
+    return Flaw{Kind::malformed, "is no whole JSON"};
   }
   const nlohmann::json* list = json.is_array() ? &json : nullptr;
   Numbers numbers;
@@ -172,17 +170,17 @@ FrameLines::Line FrameLines::read_json(std::string_view line, double now_s) cons
       const auto number = json.find(names[k]);
       if (number != json.end() && number->is_number()) {
         numbers[k] = number->get<double>();
-      } else if (number != json.end() && !number->is_null() && elements_ > 0) {
-        return Finding{Kind::no_number, fmt::format("'{}' is no number", names[k])};
+      } else if (number != json.end() && !number->is_null() && !of_poses()) {
+        return Flaw{Kind::no_number, fmt::format("'{}' is no number", names[k])};
       }
     }
   }
   std::vector<double> values;
-  if (elements_ > 0 && list == nullptr) {
-    return Finding{Kind::malformed, "has no list 'pressure'"};
+  if (!of_poses() && list == nullptr) {
+    return Flaw{Kind::malformed, "has no list 'pressure'"};
   }
-  if (elements_ > 0 && !add_readings(*list, values)) {
-    return Finding{Kind::no_number, "'pressure' holds something else than numbers and null"};
+  if (!of_poses() && !add_readings(*list, values)) {
+    return Flaw{Kind::no_number, "'pressure' holds something else than numbers and null"};
   }
   return frame_of(numbers, std::move(values), now_s);
 }
@@ -191,19 +189,19 @@ FrameLines::Line FrameLines::read_header(const std::vector<std::string_view>& ce
   std::vector<std::size_t> columns;
   for (const std::string_view name : cells) {
     const auto found = std::ranges::find(names, name);
-    const bool is_other = elements_ == 0 && found == names.end();
+    const bool is_other = of_poses() && found == names.end();
     columns.push_back(name.empty() || name == "device_time" || name == "lost_before" || is_other
                           ? left_out
                           : static_cast<std::size_t>(found - names.begin()));
   }
   const auto readings = static_cast<std::size_t>(std::ranges::count(columns, reading));
   if (readings != elements_) {
-    return Finding{Kind::malformed, fmt::format("names {} readings for an array of {} elements",
-                                                readings, elements_)};
+    return Flaw{Kind::malformed,
+                fmt::format("names {} readings for an array of {} elements", readings, elements_)};
   }
-  for (std::size_t k = 0; k < names.size() && elements_ == 0; ++k) {
+  for (std::size_t k = 0; k < names.size() && of_poses(); ++k) {
     if (std::ranges::find(columns, k) == columns.end()) {
-      return Finding{Kind::malformed, fmt::format("names no column '{}'", names[k])};
+      return Flaw{Kind::malformed, fmt::format("names no column '{}'", names[k])};
     }
   }
   columns_ = std::move(columns);
@@ -211,39 +209,55 @@ FrameLines::Line FrameLines::read_header(const std::vector<std::string_view>& ce
 }
 
 /// Finds what the columns of rows without a header hold, by the first row.
-std::optional<FrameLines::Finding> FrameLines::find_columns(
+std::optional<FrameLines::Flaw> FrameLines::find_columns(
     const std::vector<std::string_view>& cells) {
   const std::size_t filled = cells.size() - (cells.back().empty() ? 1 : 0);
-  const std::size_t before = elements_ == 0 ? reading : filled - std::min(filled, elements_);
+  const std::size_t before = of_poses() ? reading : filled - std::min(filled, elements_);
   if (filled < elements_ || (before > 1 && before != reading)) {
-    return Finding{Kind::malformed,
-                   fmt::format("has {} numbers for an array of {} elements", filled, elements_)};
+    return Flaw{Kind::malformed,
+                fmt::format("has {} numbers for an array of {} elements", filled, elements_)};
   }
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    columns_.push_back(i < before ? i : i < filled && elements_ > 0 ? reading : left_out);
+    columns_.push_back(i < before ? i : i < filled && !of_poses() ? reading : left_out);
   }
   return {};
 }
 
-FrameLines::Line FrameLines::read_csv(std::string_view line, double now_s) {
+FrameLines::Line FrameLines::read_csv(std::string_view line, bool is_first, double now_s) {
   std::vector<std::string_view> cells;
-  if (const char* finding = split_cells(line, separator_of(line), cells)) {
-    return Finding{Kind::malformed, finding};
+  const bool has_columns = !columns_.empty();
+  if (!has_columns) {
+    // A pose may have other cells behind it, with other separators in them.
+    const bool has_commas =
+        of_poses() && split_cells(line, ',', cells) == nullptr && cells.size() >= names.size();
+    separator_ = has_commas ? ',' : separator_of(line);
   }
-  if (elements_ == 0 && cells.size() < names.size()) {
-    return Finding{Kind::malformed, "is no JSON object, and no row of CSV with four numbers"};
+  if (const char* fault = split_cells(line, separator_, cells)) {
+    return Flaw{Kind::malformed, fault};
   }
-  if (columns_.empty()) {
-    if (!reading_in(cells.front())) {
+  if (of_poses() && cells.size() < names.size()) {
+    return Flaw{Kind::malformed, "is no JSON object, and no row of CSV with four numbers"};
+  }
+  if (!has_columns) {
+    if ((is_first || !of_poses()) && !reading_in(cells.front())) {
       return read_header(cells);
     }
-    if (auto finding = find_columns(cells)) {
-      return *std::move(finding);
+    if (auto flaw = find_columns(cells)) {
+      return *std::move(flaw);
     }
   }
-  if (elements_ > 0 && cells.size() != columns_.size()) {
-    return Finding{Kind::malformed,
-                   fmt::format("has {} cells, the first line {}", cells.size(), columns_.size())};
+  Line row = read_row(cells, now_s);
+  if (!has_columns && !std::holds_alternative<Frame>(row)) {
+    columns_.clear();  // a refused line says nothing of the others
+  }
+  return row;
+}
+
+FrameLines::Line FrameLines::read_row(const std::vector<std::string_view>& cells,
+                                      double now_s) const {
+  if (!of_poses() && cells.size() != columns_.size()) {
+    return Flaw{Kind::malformed,
+                fmt::format("has {} cells, the first line {}", cells.size(), columns_.size())};
   }
   Numbers numbers;
   std::vector<double> values;
@@ -253,16 +267,16 @@ FrameLines::Line FrameLines::read_csv(std::string_view line, double now_s) {
       continue;
     }
     const std::optional<double> number = reading_in(cells[i]);
-    if (elements_ == 0) {
+    if (of_poses()) {
       numbers[column] = number && std::isfinite(*number) ? number : std::nullopt;
       continue;
     }
     if (!number || (column == 0 && !std::isfinite(*number))) {
       // A message stays one short line whatever the cell holds.
       const bool shown = cells[i].size() <= 60 && is_printable(cells[i]);
-      return Finding{Kind::no_number, fmt::format("column {}{} is no {}", i + 1,
-                                                  shown ? fmt::format(" = '{}'", cells[i]) : "",
-                                                  column == 0 ? "time" : "number")};
+      return Flaw{Kind::no_number, fmt::format("column {}{} is no {}", i + 1,
+                                               shown ? fmt::format(" = '{}'", cells[i]) : "",
+                                               column == 0 ? "time" : "number")};
     }
     if (column == reading) {
       values.push_back(*number);
@@ -289,23 +303,23 @@ bool FrameLines::is_text(std::string_view line) {
 FrameLines::Line FrameLines::frame_of(Numbers numbers, std::vector<double> values,
                                       double now_s) const {
   if (values.size() != elements_) {
-    return Finding{Kind::malformed, fmt::format("has {} readings for an array of {} elements",
-                                                values.size(), elements_)};
+    return Flaw{Kind::malformed, fmt::format("has {} readings for an array of {} elements",
+                                             values.size(), elements_)};
   }
   auto& [time_s, x_mm, y_mm, theta_rad] = numbers;
-  if (elements_ > 0) {
+  if (!of_poses()) {
     time_s = time_s.value_or(now_s);
   }
   std::optional<Pose> pose;
-  if (elements_ == 0 || x_mm || y_mm || theta_rad) {
+  if (of_poses() || x_mm || y_mm || theta_rad) {
     for (std::size_t k = 0; k < names.size(); ++k) {
       if (!numbers[k]) {
-        return Finding{Kind::no_number, fmt::format("has no number '{}'", names[k])};
+        return Flaw{Kind::no_number, fmt::format("has no number '{}'", names[k])};
       }
     }
     pose = Pose{{*x_mm, *y_mm}, *theta_rad};
     if (!is_robot_pose(*pose)) {
-      return Finding{
+      return Flaw{
           Kind::far_away,
           fmt::format("x_mm = {}, y_mm = {}, theta_rad = {}: no robot is further away than 1e9 mm, "
                       "or has turned by more than 1e9 rad",

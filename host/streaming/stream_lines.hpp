@@ -71,18 +71,20 @@ class LineReader {
 /// CSV, its cells separated by tabs, semicolons, commas or blanks: with a header, columns of the
 /// names above and one for each reading (`device_time` and `lost_before` are left out); without
 /// one, the readings alone, behind a time, or behind time, x_mm, y_mm and theta_rad. The first line
-/// decides, also whether a separator follows the last cell. An empty cell or nan is an Unknown
-/// reading.
+/// decides, also what the separator is and whether one follows the last cell. An empty cell or nan
+/// is an Unknown reading.
 ///
-/// A pose has all four numbers. In lines of poses, other columns and keys are left out.
+/// A pose has all four numbers. In lines of poses, other columns and keys are left out, and commas
+/// separate the cells where a line has three or more.
 class FrameLines {
  public:
-  struct Finding {
+  /// Why a line is refused.
+  struct Flaw {
     enum class Kind { malformed, no_number, far_away } kind = Kind::malformed;
     std::string words;
   };
   struct Header {};
-  using Line = std::variant<Frame, Finding, Header>;
+  using Line = std::variant<Frame, Flaw, Header>;
 
   /// @param elements of the array, e; 0: the lines are poses
   explicit FrameLines(std::size_t elements) : elements_(elements) {}
@@ -90,7 +92,7 @@ class FrameLines {
   std::size_t elements() const { return elements_; }
 
   /// @param line not blank
-  /// @param now_s the time of frames without a time of their own
+  /// @param now_s the time of frames without a time of their own; not used for poses
   Line read(std::string_view line, double now_s);
 
   /// True for a line of words, such as a board prints as it starts: no JSON, and at most half of it
@@ -99,17 +101,23 @@ class FrameLines {
 
  private:
   static constexpr std::array<const char*, 4> names{"time", "x_mm", "y_mm", "theta_rad"};
-  using Numbers = std::array<std::optional<double>, 4>;  ///< in the order of `names`
+  // What a column of CSV holds: an index of `names`, or one of these.
+  static constexpr std::size_t reading = names.size();
+  static constexpr std::size_t left_out = reading + 1;
+  using Numbers = std::array<std::optional<double>, names.size()>;  ///< in the order of `names`
 
+  bool of_poses() const { return elements_ == 0; }
   Line read_json(std::string_view line, double now_s) const;
-  Line read_csv(std::string_view line, double now_s);
+  Line read_csv(std::string_view line, bool is_first, double now_s);
   Line read_header(const std::vector<std::string_view>& cells);
-  std::optional<Finding> find_columns(const std::vector<std::string_view>& cells);
+  std::optional<Flaw> find_columns(const std::vector<std::string_view>& cells);
+  Line read_row(const std::vector<std::string_view>& cells, double now_s) const;
   Line frame_of(Numbers numbers, std::vector<double> values, double now_s) const;
 
   std::size_t elements_;
-  /// What each column of CSV holds: an index of `names`, a reading, or what is left out.
-  std::vector<std::size_t> columns_;
+  bool is_first_ = true;              ///< no line was read: only the first may be a header of poses
+  std::vector<std::size_t> columns_;  ///< of CSV; empty before its first row or header
+  char separator_ = ',';              ///< between them
 };
 
 }  // namespace palpate

@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "file_parts.hpp"
 #include "palpate/touch.hpp"
 #include "support/host_locale.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::scene_test {
 
@@ -171,6 +174,29 @@ TEST_F(SceneFile, IsOneDocumentOfYaml) {
   expect_named(message("ratio: 0.3\n---\nbins: auto"), {"line 2", "second document"});
   expect_named(message("ratio: 0.3\nobjects: [1, 2\nbins: 3"), {"line", "YAML"});
   expect_named(input_error([&] { read_scene(folder_ / "no.yaml"); }), {"no.yaml", "no such file"});
+}
+
+// Cut short or with flipped bits: read, or refused by name.
+TEST_F(SceneFile, IsReadOrRefusedWhateverItsBytes) {
+  const std::string good =
+      "array: [[0, 1], [2, 3]]\nthreshold: 2.0\nobjects:\n  - {map: A.h5, label: A, weight: 1.0}\n"
+      "region: {x_mm: [-10, 10], theta_deg: [0, 360]}\nbins: [25, 25, 16]\nfilter: histogram\n";
+  read(good);
+  std::mt19937 random(6);
+  int refused = 0;
+  for (int k = 0; k < trials(100); ++k) {
+    std::string bytes = k % 3 == 0 ? good.substr(0, random() % good.size()) : good;
+    for (int flips = k % 3 == 0 ? 0 : k % 2 == 0 ? 1 : 8; flips > 0; --flips) {
+      bytes[random() % bytes.size()] ^= static_cast<char>(1 << random() % 8);
+    }
+    try {
+      read(bytes);
+    } catch (const Error&) {
+      message(bytes);
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 0) << "the damage hit nothing that matters";
 }
 
 }  // namespace palpate::scene_test

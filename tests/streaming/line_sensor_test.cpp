@@ -26,7 +26,7 @@ using Lines = std::vector<std::string>;
 auto read_last(const Lines& lines) {
   FrameLines format(3);
   for (std::size_t i = 0; i + 1 < lines.size(); ++i) {
-    EXPECT_FALSE(std::holds_alternative<FrameLines::Finding>(format.read(lines[i], now_s)));
+    EXPECT_FALSE(std::holds_alternative<FrameLines::Flaw>(format.read(lines[i], now_s)));
   }
   return format.read(lines.back(), now_s);
 }
@@ -112,9 +112,9 @@ TEST(FrameLines, SayWhatIsWrong) {
       {{"7.5,1e300,5,6,1,2,3"}, "x_mm = 1e+300"}};
   for (const auto& [lines, words] : cases) {
     const auto read = read_last(lines);
-    const auto* finding = std::get_if<FrameLines::Finding>(&read);
-    ASSERT_NE(finding, nullptr) << words;
-    expect_named(finding->words, {words});
+    const auto* flaw = std::get_if<FrameLines::Flaw>(&read);
+    ASSERT_NE(flaw, nullptr) << words;
+    expect_named(flaw->words, {words});
   }
 }
 

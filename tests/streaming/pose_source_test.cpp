@@ -107,9 +107,23 @@ TEST_F(PoseSource, FileOfEveryFormServesEveryStart) {
     rows += fmt::format("{},{},1,0.5\n", time_of(i), i);
     shuffled += fmt::format("0.5, {}, {}, up, 1\r\n", i, time_of(i));
   }
+  const std::string header = "time,x_mm,y_mm,theta_rad\n";
+  const auto separated = [](std::string text, char separator) {
+    std::ranges::replace(text, ',', separator);
+    return text;
+  };
+  const auto with_notes = [](std::string text, const std::string& note) {
+    for (std::size_t at = 0; (at = text.find('\n', at)) != text.npos; at += note.size() + 1) {
+      text.insert(at, note);
+    }
+    return text;
+  };
   const std::string json = "\n" + lines(0, 51);
-  for (const std::string& text : {json, json.substr(0, json.size() - 1),
-                                  "time,x_mm,y_mm,theta_rad\n" + rows, rows, shuffled}) {
+  for (const std::string& text :
+       {json, json.substr(0, json.size() - 1), header + rows, rows, shuffled, separated(rows, ';'),
+        separated(rows, ' '), separated(header + rows, '\t'), with_notes(rows, ",up; or\tdown"),
+        header + with_notes(rows, ",up; or\tdown"),
+        separated(header, '\t') + with_notes(separated(rows, '\t'), "\tup, or, else, down")}) {
     SCOPED_TRACE(text.substr(0, 40));
     put_bytes(path_, text);
     board_ = {};
@@ -170,6 +184,7 @@ TEST_F(PoseSource, FileWithABadLineIsRefusedByNumber) {
       {two + "nonsense\n" + lines(2, 3), "line 3: is no JSON object"},
       {two + "[1, 2]\n", "line 3: is no JSON object"},
       {two + "{\"time\": 1}\n", "line 3: has no number 'x_mm'"},
+      {two + "time,x_mm,y_mm,theta_rad\n", "line 3: has no number 'time'"},
       {two + "{\"x_mm\": 1, \"y_mm\": 1, \"theta_rad\": 1}\n", "line 3: has no number 'time'"},
       {two + "{\"time\": 1, \"x_mm\": \"1\", \"y_mm\": 1, \"theta_rad\": 1}\n",
        "line 3: has no number 'x_mm'"},
@@ -247,6 +262,26 @@ TEST_F(PoseFifo, EveryKindOfFaultIsSaidOnce) {
   }
   EXPECT_EQ(sensor_->poses().refused, 15u);
   EXPECT_EQ(sensor_->poses().read, 11u);
+}
+
+TEST_F(PoseFifo, AStampThatIsFarLaterCostsNoFrameItsPoseAndIsSaidAtOnce) {
+  tell(lines(0, 21) + line(1000.0 * time_of(20), 20) + lines(21, 71));
+  ASSERT_EQ(complaints_.size(), 1u) << "when it happens";
+  expect_named(complaints_[0], {"line 22", "1700000000200 s", "far later than the poses around"});
+  tell(line(1000.0 * time_of(70), 70) + lines(71, 101));
+  EXPECT_EQ(complaints_.size(), 1u) << "once";
+  add_frames(0, 100);
+  EXPECT_EQ(posed_frames(*sensor_), 100u);
+  EXPECT_EQ(sensor_->poses().read, 101u);
+  EXPECT_EQ(sensor_->poses().refused, 2u);
+  EXPECT_EQ("poses " + sensor_->poses().first_refused, complaints_[0]);
+}
+
+// A refused line decides neither the columns nor the separator of the others.
+TEST_F(PoseFifo, WordsBeforeThePosesAreRefusedAlone) {
+  tell("the robot is ready now\n1 robot is ready\n1.7e9,1,2,0.5\n");
+  EXPECT_EQ(sensor_->poses().refused, 2u);
+  EXPECT_EQ(sensor_->poses().read, 1u);
 }
 
 // The poses of a clock that was set back join the track: none of their lines is refused.
