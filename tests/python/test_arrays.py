@@ -49,6 +49,57 @@ def test_arrays_that_were_checked_stay() -> None:
     assert recording[1:].object == "mug"
 
 
+@pytest.mark.parametrize(
+    ("reshaped", "shape", "named"),
+    [
+        ("pressure", (24,), "pressure"),
+        ("pressure", (6, 4), "T_robot_sensor"),  # which has no six rows
+        ("T_robot_sensor", (12,), "T_robot_sensor"),
+        ("elements_mm", (2, 6), "elements_mm"),
+        ("valid", (24,), "valid"),
+    ],
+)
+def test_arrays_that_are_changed_in_place_are_refused_at_use(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid], reshaped: str, shape: tuple[int, ...],
+    named: str,
+) -> None:  # fmt: skip
+    belief = palpate.PoseHistogram(device, maps)
+    recording = palpate.Recording(**arrays(), valid=numpy.ones((4, 6), bool))
+    getattr(recording, reshaped).shape = shape
+    for use in (belief.update, lambda given: given.save("none.h5"),
+                lambda given: palpate.recognize(given, maps)):  # fmt: skip
+        assert error_of(use, recording) == f"{named}: was given another shape; make another Recording"
+
+
+def test_a_touch_that_is_changed_in_place_is_refused_at_use(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid]
+) -> None:
+    belief = palpate.PoseHistogram(device, maps)
+    touch = palpate.Touch((0, 0, 0), GRID, numpy.zeros(6))
+    touch.pressure.shape = (2, 3)
+    assert error_of(belief.update, [touch]) == "pressure: was given another shape; make another Touch"
+    touch.pressure.shape = (6,)
+    touch.pressure.dtype = numpy.dtype("int64")
+    with pytest.raises(TypeError, match="pressure: was given another dtype"):
+        belief.update(touch)
+
+
+def test_attributes_of_another_type_are_refused_at_once() -> None:
+    recording = palpate.Recording(**arrays())
+    others = {"object": 3, "pressure_unit": None, "rows": b"touches", "sensor": 1, "serial": 7}
+    for name, value in others.items():
+        with pytest.raises(TypeError, match=f"^{name}: {value!r}; give str$"):
+            palpate.Recording(**arrays(), **{name: value})
+    for change in (lambda: palpate.Recording(**arrays(), truth="E"),
+                   lambda: setattr(recording, "truth", "E")):  # fmt: skip
+        with pytest.raises(TypeError, match=r"^truth: 'E'; give Truth \| None$"):
+            change()
+    with pytest.raises(TypeError, match="^object: None; give str$"):
+        recording.object = None
+    recording.truth = palpate.Truth("E", (0, 0, 0))
+    recording.truth = None
+
+
 def test_a_slice_has_the_rows_of_every_array() -> None:
     rows = {"valid": numpy.eye(4, 6, dtype=bool), "time_s": numpy.arange(4.0),
             "device_time_s": numpy.arange(4.0) * 2, "lost_before": numpy.arange(4)}  # fmt: skip

@@ -1,11 +1,13 @@
 """What is misused raises the exception that Python has for it, and no call ends the process; without Vulkan, all
 that needs no device works."""
 
+import gc
 import inspect
 import os
 import pathlib
 import subprocess
 import sys
+import weakref
 from typing import Any
 
 import numpy
@@ -13,7 +15,7 @@ import pytest
 from conftest import error_of
 
 import palpate
-from palpate import _palpate
+from palpate import _palpate, reference
 from palpate.recognition import RecognitionOptions
 
 
@@ -88,6 +90,18 @@ def test_what_a_path_raises_is_raised(tmp_path: pathlib.Path) -> None:
         for path, error in ((Raising(), ZeroDivisionError), (f"{tmp_path}/a\0b", ValueError), (3, TypeError)):
             with pytest.raises(error):
                 use(path)
+
+
+def test_a_proxy_to_what_is_gone_is_refused(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid]
+) -> None:
+    gone = weakref.proxy(RECORDING[:2])
+    gc.collect()
+    for use in (palpate.PoseHistogram(device, maps).update, lambda gone: palpate.recognize(gone, maps),
+                lambda gone: _palpate.write_recording("none.h5", gone),
+                lambda gone: reference.classify(gone, palpate.ContactClassifier())):  # fmt: skip
+        with pytest.raises((ReferenceError, TypeError)):
+            use(gone)
 
 
 def test_a_flag_of_another_type_is_refused_by_name() -> None:
