@@ -114,6 +114,10 @@ def test_a_flag_of_another_type_is_refused_by_name() -> None:
             palpate.recognize(RECORDING, (), **{name: value})
 
 
+def test_a_bad_option_is_told_before_recordings_are_read(maps: list[palpate.OccupancyGrid]) -> None:
+    assert error_of(palpate.recognize, "none.h5", maps, scene="none.yaml").startswith("none.yaml: ")
+
+
 def test_progress_and_timeouts_are_checked_before_the_work(
     device: palpate.Device, maps: list[palpate.OccupancyGrid]
 ) -> None:
