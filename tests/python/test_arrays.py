@@ -212,12 +212,23 @@ def test_results_are_views_that_keep_their_memory(
     belief.update(unknown)
     identity = belief.estimate().identity  # of an Estimate that nothing else keeps
     xy = belief.marginals(1).xy
+    cells = palpate.OccupancyGrid("A", numpy.ones((3, 4)), cell_mm=1, origin_mm=(0, 0)).log_odds
     for _ in range(100):
         numpy.ones(3)
     assert identity.sum() == pytest.approx(1.0, abs=1e-12)
+    assert (cells == 1).all()
     assert xy.shape == (25, 25)
     assert xy.sum() == pytest.approx(identity[1], abs=1e-6)
     assert belief.log_likelihood(0).shape == belief.lattice.shape == (16, 25, 25)
+
+
+def test_poses_compose() -> None:
+    T_a_b, T_b_c = numpy.array([1.0, 2.0, 0.3]), numpy.array([-4.0, 5.0, 2.0])
+    points = numpy.array([[0.0, 0.0], [3.0, -1.0]])
+    T_a_c = palpate.compose(T_a_b, T_b_c)
+    both = palpate.transform(T_a_b, palpate.transform(T_b_c, points))
+    assert numpy.allclose(both, palpate.transform(T_a_c, points), atol=1e-12)
+    assert numpy.allclose(palpate.compose(T_a_c, palpate.inverse(T_a_c)), 0, atol=1e-12)
 
 
 def test_what_is_no_touch_is_refused(device: palpate.Device, maps: list[palpate.OccupancyGrid]) -> None:
