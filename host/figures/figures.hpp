@@ -18,7 +18,8 @@ namespace palpate {
 /// Draws maps side by side at one scale and returns the bytes of a PNG file. Colours show log odds
 /// relative to each map's prior (white = prior, blue = empty, red = occupied); one colour bar in
 /// nats serves all, and each has axes in mm. y points up. The same maps give the same bytes.
-/// @param maps at least one
+/// @param maps at least one; each has cells, and nx * ny log odds, as read_map() and builders make
+/// them
 /// @throws Error on lack of memory
 std::string draw_maps(std::span<const OccupancyGrid> maps);
 
@@ -53,6 +54,8 @@ struct RecognitionSheet {
 /// and y; the belief over where T_robot_object's origin lies; and the identity probabilities over
 /// the touches. For a symmetric object, the true pose drawn is the one nearest to the estimate. The
 /// same sheet gives the same bytes.
+/// @param sheet its map as for draw_maps(), belief.xy of cells x cells, and after every touch as
+/// many probabilities as there are labels
 /// @throws Error on a symmetric object with a truth but without an occupied cell, or lack of memory
 std::string draw_recognition(const RecognitionSheet& sheet);
 

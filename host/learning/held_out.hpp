@@ -91,7 +91,8 @@ std::vector<double> log_probabilities(const HeldOut& press, double temperature,
                                       double feature_weight = 0.0);
 /// How right and how honest the probabilities of presses are; see evaluate().
 Scores scores_of(std::span<const HeldOut> presses, double temperature, double feature_weight = 0.0);
-/// The losses of single touches with their labels' log probabilities, in nats.
+/// -log of the true label's probability, of each single touch; `log_evidence` holds log
+/// probabilities, see tempered_by_folds().
 std::vector<double> losses_of(std::span<const HeldOut> all);
 
 /// By how much more the second of two models loses on the same presses.
@@ -123,13 +124,13 @@ struct SensorGain {
 /// @param tempered what the table says, see tempered_by_folds()
 SensorGain gain_of(std::span<const HeldOut> eq7, std::span<const HeldOut> tempered);
 
-/// The scale with stranger_sd and stranger_alone by which the fits are likeliest, those of several
-/// touches and of one; each object counts alike. Either is none where fewer than three objects have
-/// five such fits.
+/// The scale with stranger_sd and stranger_single_touch by which the fits are likeliest, those of
+/// several touches and of one; each object counts alike. Either is none where fewer than three
+/// objects have five such fits.
 /// @param objects [label]
 /// @param scale of learned objects' z
-/// @returns stranger_sd from 1 to 16, stranger_alone with a mean from -16 to 0 and an sd from 1 to
-/// 16
+/// @returns stranger_sd from 1 to 16, stranger_single_touch with a mean from -16 to 0 and an sd
+/// from 1 to 16
 FitScale with_strangers(const std::map<std::size_t, std::vector<StrangerFit>>& objects,
                         FitScale scale);
 

@@ -6,8 +6,8 @@
 
 namespace palpate {
 
-/// How far a work of parts is: parts that follow each other, each of a cost, or that host threads
-/// add as they end them.
+/// How much of some work is done. Its parts follow each other, each with a cost, or host threads
+/// end them in any order.
 class Progress {
  public:
   /// @param cost of all parts

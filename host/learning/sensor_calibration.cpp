@@ -276,6 +276,15 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& given_presses,
     throw Error(Fault::input, "no touches; give recordings with touches");
   }
   const bool known_poses = at_known_poses(given_presses);
+  for (const Press& press : given_presses) {
+    const Press& first = given_presses.front();
+    if (press.T_object_robot.has_value() != first.T_object_robot.has_value()) {
+      throw Error(Fault::input,
+                  fmt::format("{}: its pose is {}known, unlike that of {}; calibrate "
+                              "from one kind",
+                              press.name, press.T_object_robot ? "" : "un", first.name));
+    }
+  }
   CalibrationSettings settings = options;
   settings.readings.spacing_mm = spacing_mm_of(given_presses);
   if (settings.tables.empty()) {

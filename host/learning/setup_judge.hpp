@@ -46,8 +46,8 @@ struct SetupFit {
   std::size_t misfits = 0;
   double told = 0.0;  ///< nats by which the maps tell the readings better than the prior does
 
-  /// Of sound set-ups hardly a touch is a misfit. A set-up that is to be `named` has to fit better
-  /// than one that is left as it is, whose poses may be a little off.
+  /// In a sound set-up hardly any touch is a misfit. A set-up that is to be `named` has to fit
+  /// better than one that is left as it is, whose poses may be a little off.
   bool is_sound(bool named) const {
     return misfits <= std::max(least_misfits, touches / (named ? 50 : 20)) && told > 0.0;
   }

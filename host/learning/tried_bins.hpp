@@ -40,8 +40,8 @@ struct Trial {
   Press press;
   std::optional<std::size_t> half = {};  ///< see HeldOut::half
 };
-/// Presses, and with bins, at known poses, groups of presses_in_group of one object behind them,
-/// all as_unknown().
+/// A trial of each press. With bins (poses are known) trials of groups of presses_in_group presses
+/// of one object follow, and all are as_unknown().
 std::vector<Trial> trials_of(const std::vector<Press>& presses,
                              const std::optional<RecognitionBins>& bins, std::size_t fold);
 

@@ -32,8 +32,9 @@ std::optional<Fit> best_fit_near(std::span<const TouchEvidence> touches, const P
 inline constexpr double usual_stranger_sd = 4.0;
 
 /// The density, but for a factor, of Fit::z of touches of a stranger, an object that was never
-/// learned, at the best pose of the best object that was. One touch fits as stranger_alone says;
-/// further ones have to share its pose, and each spreads z by stranger_sd more. No density is 0.
+/// learned, at the best pose of the best object that was. One touch fits as stranger_single_touch
+/// says; further ones have to share its pose, and each spreads z by stranger_sd more. No density is
+/// 0.
 /// @param fit on the scale
 /// @param touches with an element In Contact
 /// @param scale that was learned

@@ -55,33 +55,33 @@ struct Array {
 using Floats = Array<double>;
 using Bytes = Array<std::uint8_t>;
 
-/// Reads the array in place. Throws what Python raises where it is of other values, or its layout
-/// is not C's.
+/// Reads the array in place. Throws what Python raises where it is of other values, which may have
+/// been made so in place, or its layout is not C's.
 template <typename Value>
-Array<Value> in_place(nb::object array);
+Array<Value> in_place(nb::object array, const char* name);
 
 /// Takes the arrays of one call, whose extents have to agree: palpate._arrays.Reader in C++.
 class ArrayReader {
  public:
   using Shape = std::initializer_list<const char*>;
 
-  Floats floats(nb::handle given, const char* name, Shape shape) const {
-    return in_place<double>(read("floats", given, name, shape));
+  Floats floats(nb::handle given, const char* name, Shape shape) {
+    return in_place<double>(read("floats", given, name, shape), name);
   }
   /// Readings, NaN where they are masked.
-  Floats known(nb::handle given, const char* name, Shape shape) const {
-    return in_place<double>(read("known", given, name, shape));
+  Floats known(nb::handle given, const char* name, Shape shape) {
+    return in_place<double>(read("known", given, name, shape), name);
   }
-  Bytes flags(nb::handle given, const char* name, Shape shape) const {
-    return in_place<std::uint8_t>(read("flags", given, name, shape));
+  Bytes flags(nb::handle given, const char* name, Shape shape) {
+    return in_place<std::uint8_t>(read("flags", given, name, shape), name);
   }
   /// Booleans of a picture.
-  Bytes pixels(nb::handle given, const char* name, Shape shape) const {
-    return in_place<std::uint8_t>(read("pixels", given, name, shape));
+  Bytes pixels(nb::handle given, const char* name, Shape shape) {
+    return in_place<std::uint8_t>(read("pixels", given, name, shape), name);
   }
 
  private:
-  nb::object read(const char* kind, nb::handle given, const char* name, Shape shape) const {
+  nb::object read(const char* kind, nb::handle given, const char* name, Shape shape) {
     nb::list extents;
     for (const char* extent : shape) {
       extents.append(extent);

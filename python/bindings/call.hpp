@@ -21,12 +21,16 @@ class WithoutGil {
   PyThreadState* state_;
 };
 
-/// Registers with Python's atexit: calls of daemon threads stop at their next report or check, or
-/// return, before the process takes down what they use. Waits ten seconds for them at most.
+/// At the interpreter's end, waits (ten seconds at most) until no other thread is in the library:
+/// calls of daemon threads stop for good at their next report or check, or at their return. Threads
+/// of the library's own are not waited for.
 void await_calls_at_exit();
+/// Whether this thread ends the interpreter, and calls of all others have stopped for good, with
+/// what they hold.
+bool calls_are_held();
 
-/// For work without the GIL: has Python handle signals, about 20 times a second. Only the thread
-/// that Python called from does so, and of these the main thread alone has signals to handle.
+/// For work without the GIL: has Python handle signals, about 20 times a second. Does nothing on
+/// threads that are not Python's; handlers run on the main thread only.
 /// @throws nb::python_error where a handler raises, as that of Ctrl-C does
 void check_signals();
 

@@ -105,7 +105,7 @@ Imported import_frames(const ImportOptions& given, const ArrayLike& pressures,
                        const std::optional<ArrayLike>& poses,
                        const std::optional<ArrayLike>& object_pose) {
   const ImportOptions options = with_elements(given, elements_mm);
-  const ArrayReader reader;
+  ArrayReader reader;
   ImportRows rows;
   const Floats readings = reader.floats(pressures, "pressures", {"n", "e"});
   rows.elements = readings.shape[1];

@@ -126,7 +126,7 @@ void bind_map(nb::module_& module) {
              std::optional<double> spread_mm, bool mirror,
              const std::optional<ArrayLike>& observations,
              const std::optional<ArrayLike>& mean_level) {
-            const ArrayReader reader;
+            ArrayReader reader;
             const auto cells = [&](const ArrayLike& given, const char* name) {
               return reader.floats(given, name, {"ny", "nx"});
             };

@@ -49,7 +49,7 @@ Result<double, 3> log_likelihoods(const TouchesLike& touches, const PoseLattice&
 Result<double, 1> identity(const std::vector<ArrayLike>& log_likelihoods,
                            const std::optional<std::vector<double>>& weights) {
   reference::Posterior posterior;
-  const ArrayReader reader;
+  ArrayReader reader;
   for (const ArrayLike& bins : log_likelihoods) {
     posterior.log_likelihood.push_back(
         reader.floats(bins, "log_likelihoods", {"ntheta", "ny", "nx"}).copied());

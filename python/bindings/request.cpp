@@ -33,7 +33,7 @@ Value typed(nb::handle value) {
   return value_of<Value>(value, "another type is wanted");
 }
 
-// What Python gives for the value of an option.
+/// What Python gives for the value of an option.
 template <typename Value>
 struct Given {
   using Type = std::conditional_t<std::is_enum_v<Value>, std::string, Value>;

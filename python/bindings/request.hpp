@@ -47,9 +47,10 @@ inline std::shared_ptr<Device> device_of(const std::shared_ptr<Device>& open,
 template <typename F>
 auto run_job(nb::handle recordings, const PythonRequest& request, const Progress& progress,
              F work) {
+  // First: what is wrong with options is told before recordings are read.
+  const Request completed = run([&] { return complete(request); });
   std::vector<Recording> touched = recordings_of(recordings);
   return run(progress, [&](const Report& report) {
-    const Request completed = complete(request);
     const auto device = device_of(request.open_device, completed.device);
     return work(
         RecognitionJob(completed, std::move(touched), {}, [&]() -> Device& { return *device; }),

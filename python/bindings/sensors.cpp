@@ -221,7 +221,7 @@ void bind_detector(nb::module_& module) {
           [](TouchDetector* self, double onset, double release, double min_steady_s, double steady,
              double smooth_s, double drift_s, const std::optional<ArrayLike>& baseline,
              const std::optional<ArrayLike>& valid) {
-            const ArrayReader reader;
+            ArrayReader reader;
             std::vector<double> zeros;
             std::vector<std::uint8_t> alive;
             if (baseline) {

@@ -70,6 +70,11 @@ class Shared {
       }
       while (!held.mutex.try_lock_for(std::chrono::milliseconds(20))) {
         check_signals();
+        if (calls_are_held()) {
+          throw Error(Fault::input,
+                      "a call of a daemon thread keeps this object, and stopped for good as the "
+                      "interpreter ended; let the thread end before");
+        }
       }
       held.worker = std::this_thread::get_id();
     }

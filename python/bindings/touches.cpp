@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -22,21 +23,54 @@ namespace {
 
 constexpr const char* classes = "palpate._recording";
 
-bool is_a(PyObject* object, const char* name) {
-  return nb::isinstance(object, nb::module_::import_(classes).attr(name));
+/// False also where Python cannot tell, as of a weakref.proxy to an object that is gone.
+bool is_a(PyObject* object, const char* name) noexcept {
+  try {
+    return nb::isinstance(object, nb::module_::import_(classes).attr(name));
+  } catch (const nb::python_error&) {
+    return false;
+  }
 }
 
-/// An attribute's array; none for None.
+using Shape = std::vector<std::size_t>;
+
+Error other_shape(nb::handle of, const char* name) {
+  return Error(Fault::input, fmt::format("{}: was given another shape; make another {}", name,
+                                         is_recording(of.ptr()) ? "Recording" : "Touch"));
+}
+
+/// The numbers of touches and of elements. Users can change the shape of an array in place: that of
+/// the pressure is trusted, and others are checked by it at every use.
+struct Extents {
+  explicit Extents(nb::handle of) {
+    const Shape shape = in_place<double>(of.attr("pressure"), "pressure").shape;
+    const bool has_rows = is_recording(of.ptr());
+    if (shape.size() != (has_rows ? 2 : 1)) {
+      throw other_shape(of, "pressure");
+    }
+    n = has_rows ? shape.front() : 1;
+    e = shape.back();
+  }
+
+  std::size_t n = 0;
+  std::size_t e = 0;
+};
+
+/// An attribute's array, which has this shape or n times; none for None.
 template <typename Value>
-std::optional<Array<Value>> array_in(nb::handle of, const char* name) {
-  nb::object array = of.attr(name);
-  return array.is_none() ? std::nullopt : std::optional(in_place<Value>(std::move(array)));
-}
-
-template <typename Row>
-std::vector<Row> copied(nb::handle of, const char* name) {
-  const auto array = array_in<NumberOf<Row>>(of, name);
-  return array ? array->template copied<Row>() : std::vector<Row>();
+std::optional<Array<Value>> array_in(nb::handle of, const char* name, std::size_t n,
+                                     const Shape& row) {
+  nb::object given = of.attr(name);
+  if (given.is_none()) {
+    return std::nullopt;
+  }
+  Array<Value> array = in_place<Value>(std::move(given), name);
+  Shape rows = row;
+  rows.insert(rows.begin(), n);
+  if (array.shape != row && array.shape != rows) {
+    throw other_shape(of, name);
+  }
+  return array;
 }
 
 template <typename Value>
@@ -44,22 +78,30 @@ Value value_in(nb::handle of, const char* name) {
   return value_of<Value>(of.attr(name), fmt::format("{}: a value of another type", name));
 }
 
-/// Views of [n] rows of an attribute's array, each of `each` items; of an array of one row, the
-/// same for all.
 template <typename Row>
-auto rows_of(nb::handle of, const char* name, std::size_t each) {
-  const auto array = array_in<NumberOf<Row>>(of, name);
+std::vector<Row> copied(nb::handle of, const char* name, std::size_t n, const Shape& row) {
+  const auto array = array_in<NumberOf<Row>>(of, name, n, row);
+  return array ? array->template copied<Row>() : std::vector<Row>();
+}
+
+/// Views of [n] rows of an attribute's array, each of this shape; of an array of one row, the same
+/// for all.
+template <typename Row>
+auto rows_of(nb::handle of, const char* name, std::size_t n, const Shape& row) {
+  const auto array = array_in<NumberOf<Row>>(of, name, n, row);
   const std::span<const Row> all = array ? array->template rows<Row>() : std::span<const Row>();
+  const std::size_t each = std::is_same_v<Row, Pose> ? 1 : row.front();
   return
       [all, each](std::size_t i) { return all.size() <= each ? all : all.subspan(i * each, each); };
 }
 
-/// [n] touches of e elements, whose arrays the object keeps.
-void add_touches(nb::handle of, std::size_t n, std::size_t e, std::vector<Touch>& touches) {
-  const auto pose = rows_of<Pose>(of, "T_robot_sensor", 1);
-  const auto elements_mm = rows_of<glm::dvec2>(of, "elements_mm", e);
-  const auto pressure = rows_of<double>(of, "pressure", e);
-  const auto valid = rows_of<std::uint8_t>(of, "valid", e);
+/// The touches of a Touch or a Recording, whose arrays the object keeps.
+void add_touches(nb::handle of, std::vector<Touch>& touches) {
+  const auto [n, e] = Extents(of);
+  const auto pose = rows_of<Pose>(of, "T_robot_sensor", n, {3});
+  const auto elements_mm = rows_of<glm::dvec2>(of, "elements_mm", n, {e, 2});
+  const auto pressure = rows_of<double>(of, "pressure", n, {e});
+  const auto valid = rows_of<std::uint8_t>(of, "valid", n, {e});
   for (std::size_t i = 0; i < n; ++i) {
     touches.push_back({pose(i).front(), elements_mm(i), pressure(i), valid(i)});
   }
@@ -73,14 +115,13 @@ nb::object array_or_none(std::vector<Row>& rows, const std::size_t (&shape)[rank
 
 }  // namespace
 
-bool is_touch(PyObject* object) { return is_a(object, "Touch"); }
-bool is_recording(PyObject* object) { return is_a(object, "Recording"); }
+bool is_touch(PyObject* object) noexcept { return is_a(object, "Touch"); }
+bool is_recording(PyObject* object) noexcept { return is_a(object, "Recording"); }
 
 TouchViews views_of(nb::handle touches) {
   TouchViews views{.touches = {}, .kept = nb::borrow(touches)};
   if (is_recording(touches.ptr())) {
-    const auto shape = array_in<double>(touches, "pressure")->shape;
-    add_touches(touches, shape[0], shape[1], views.touches);
+    add_touches(touches, views.touches);
     return views;
   }
   // A list of its own, which the progress cannot change.
@@ -93,28 +134,29 @@ TouchViews views_of(nb::handle touches) {
                               "of Touch",
                               views.touches.size(), nb::inst_name(item).c_str()));
     }
-    add_touches(item, 1, array_in<double>(item, "pressure")->size(), views.touches);
+    add_touches(item, views.touches);
   }
   return views;
 }
 
 Recording recording_of(const RecordingObject& given) {
+  const auto [n, e] = Extents(given);
   return {.path = value_in<std::string>(given, "path"),
           .object = value_in<std::string>(given, "object"),
           .pressure_unit = value_in<std::string>(given, "pressure_unit"),
           .rows = value_in<std::string>(given, "rows"),
-          .T_robot_sensor = copied<Pose>(given, "T_robot_sensor"),
-          .pressure = copied<double>(given, "pressure"),
-          .elements_mm = copied<glm::dvec2>(given, "elements_mm"),
-          .valid = copied<std::uint8_t>(given, "valid"),
-          .time_s = copied<double>(given, "time_s"),
+          .T_robot_sensor = copied<Pose>(given, "T_robot_sensor", n, {3}),
+          .pressure = copied<double>(given, "pressure", n, {e}),
+          .elements_mm = copied<glm::dvec2>(given, "elements_mm", n, {e, 2}),
+          .valid = copied<std::uint8_t>(given, "valid", n, {e}),
+          .time_s = copied<double>(given, "time_s", n, {}),
           .truth = value_in<std::optional<Truth>>(given, "truth"),
           .findings = value_in<std::vector<SetupFinding>>(given, "_findings"),
           .sensor = value_in<std::string>(given, "sensor"),
           .serial = value_in<std::string>(given, "serial"),
-          .baseline = copied<double>(given, "baseline"),
-          .device_time_s = copied<double>(given, "device_time_s"),
-          .lost_before = copied<std::uint64_t>(given, "lost_before"),
+          .baseline = copied<double>(given, "baseline", n, {e}),
+          .device_time_s = copied<double>(given, "device_time_s", n, {}),
+          .lost_before = copied<std::uint64_t>(given, "lost_before", n, {}),
           .closed = value_in<bool>(given, "closed")};
 }
 

@@ -9,8 +9,8 @@
 
 namespace palpate::python {
 
-bool is_touch(PyObject* object);
-bool is_recording(PyObject* object);
+bool is_touch(PyObject* object) noexcept;
+bool is_recording(PyObject* object) noexcept;
 
 // The classes of palpate._recording, whose arrays are NumPy's.
 struct TouchObject : nb::object {
@@ -32,10 +32,10 @@ struct TouchViews {
   std::vector<Touch> touches;
   nb::object kept;
 };
-/// Throws Error where an item is no touch.
+/// Throws Error where an item is no touch, or was given another shape in place.
 TouchViews views_of(nb::handle touches);
 
-/// A copy, without the GIL's need.
+/// A copy, which may be used without the GIL.
 Recording recording_of(const RecordingObject& recording);
 /// Takes over the recording's memory.
 RecordingObject to_python(Recording recording);

@@ -18,6 +18,14 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
+def _checked(name: str, value: object) -> Any:
+    """The value of an attribute that is no array. Raises TypeError on one of another type."""
+    wanted, kinds = ("Truth | None", (Truth, type(None))) if name == "truth" else ("str", (str,))
+    if not isinstance(value, kinds):
+        raise TypeError(f"{name}: {value!r}; give {wanted}")
+    return value
+
+
 class _OverArrays:
     """What C++ reads in place: its arrays stay the ones that it has checked."""
 
@@ -26,7 +34,7 @@ class _OverArrays:
     def __setattr__(self, name: str, value: object) -> None:
         if name not in self._free:
             raise AttributeError(f"{name} of a {type(self).__name__} cannot be set; make another one")
-        super().__setattr__(name, value)
+        super().__setattr__(name, _checked(name, value))
 
     @classmethod
     def _of(cls, fields: dict[str, Any]) -> Any:
@@ -156,7 +164,7 @@ class Recording(_OverArrays):
         [n, e], False for a dead element; time_s [n] since the Unix epoch; object: its label, "" where unknown;
         rows: "touches", or "frames" of a raw stream, in which poses and pressures may be NaN (unknown).
 
-        Raises Error naming the argument whose shape does not fit.
+        Raises Error naming the argument whose shape does not fit; TypeError on another type.
         """
         from ._arrays import Reader
 
@@ -175,13 +183,18 @@ class Recording(_OverArrays):
                     ("lost_before", lost_before, reader.counts, "n"),
                 )
             },
+            **{
+                name: _checked(name, given)
+                for name, given in (
+                    ("object", object),
+                    ("pressure_unit", pressure_unit),
+                    ("rows", rows),
+                    ("truth", truth),
+                    ("sensor", sensor),
+                    ("serial", serial),
+                )
+            },
             path="",
-            object=object,
-            pressure_unit=pressure_unit,
-            rows=rows,
-            truth=truth,
-            sensor=sensor,
-            serial=serial,
             closed=True,
             _findings=[],
         )
@@ -209,7 +222,7 @@ class Recording(_OverArrays):
         return touch
 
     def _at(self, rows: int | slice, names: Iterable[str]) -> dict[str, Any]:
-        """These arrays, of those with a row for each touch some rows."""
+        """These arrays; of those that have a row for each touch, only the given rows."""
         import numpy
 
         def part(array: Any, axes: int) -> Any:

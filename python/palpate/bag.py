@@ -108,14 +108,14 @@ def _run(arguments: argparse.Namespace) -> None:
     folder = os.path.dirname(arguments.output) or "."
     if os.path.isdir(arguments.output) or not os.access(folder, os.W_OK):
         raise Error(f"-o {arguments.output}: cannot be written; give a file in a folder that exists")
-    for flag, number, form in (
-        ("dead", int, "numbers of elements, such as 13,42"),
-        ("plane", float, "auto, or a normal such as 0,0,1"),
-        ("mount", float, "X,Y,Z,ROLL,PITCH,YAW, mm and degrees"),
+    for flag, number, unset, form in (
+        ("dead", int, "", "numbers of elements, such as 13,42"),
+        ("plane", float, "auto", "auto, or a normal such as 0,0,1"),
+        ("mount", float, None, "X,Y,Z,ROLL,PITCH,YAW, mm and degrees"),
     ):
         text = getattr(arguments, flag)
         try:
-            _ = [number(part) for part in text.split(",")] if text and text != "auto" else []
+            _ = [number(part) for part in text.split(",")] if text != unset else []
         except ValueError:
             raise Error(f"--{flag} {text}: give {form}") from None
     shown = sys.stderr.isatty()

@@ -22,31 +22,31 @@ _Request = TypeVar("_Request")
 
 
 class RecognitionOptions(TypedDict, total=False):
-    """Options of recognize(), plan() and Task, by their names."""
+    """Options of recognize(), plan() and Task, by their names; None is the default."""
 
-    bins: tuple[int, int, int] | Literal["auto", "fine"]
-    x_mm: _Pair
-    y_mm: _Pair
-    theta_deg: _Pair
-    pivot_mm: _Pair | Literal["auto"]
-    scene: _Path
-    sensor_model: _Path | Literal["none"]
-    prior: float
-    gamma: float
-    threshold: float
-    ratio: float
-    touch_sd_mm: float
-    touch_sd_deg: float
-    slip_sd_mm: float
-    slip_sd_deg: float
-    none: float | Literal["auto"]
-    filter: Literal["auto", "histogram", "bounded", "particles"]
-    tolerance: float
-    evidence_nats: float
-    act_below_mm: float
-    act_above: float
-    frames: tuple[int, int]
-    touches: int
+    bins: tuple[int, int, int] | Literal["auto", "fine"] | None
+    x_mm: _Pair | None
+    y_mm: _Pair | None
+    theta_deg: _Pair | None
+    pivot_mm: _Pair | Literal["auto"] | None
+    scene: _Path | None
+    sensor_model: _Path | Literal["none"] | None
+    prior: float | None
+    gamma: float | None
+    threshold: float | None
+    ratio: float | None
+    touch_sd_mm: float | None
+    touch_sd_deg: float | None
+    slip_sd_mm: float | None
+    slip_sd_deg: float | None
+    none: float | Literal["auto"] | None
+    filter: Literal["auto", "histogram", "bounded", "particles"] | None
+    tolerance: float | None
+    evidence_nats: float | None
+    act_below_mm: float | None
+    act_above: float | None
+    frames: tuple[int, int] | None
+    touches: int | None
 
 
 def recognize(
@@ -66,8 +66,9 @@ def recognize(
 ) -> list[Record]:
     """Recognises the object of each recording among known maps and finds its pose.
 
-    Options are the flags of `palpate recognize`, with its defaults; `palpate recognize --help`
-    explains them. Records are those of its JSON, number for number.
+    Options are the flags of `palpate recognize`, with its defaults: those of the signature, and those
+    that RecognitionOptions lists; `palpate recognize --help` explains them. Records are those of its
+    JSON, number for number.
 
     recordings: Recording objects or files; maps: OccupancyGrid or Hypothesis objects, files, or
     folders of maps; none where the scene has them. sensor_model: a file; "none" is Eq. 7; by default

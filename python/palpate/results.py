@@ -11,14 +11,14 @@ if TYPE_CHECKING:
 
 
 def text_of(shown: object) -> str:
-    """Class(name=value, ...), by the properties of a class of C++; arrays to three digits."""
+    """Class(name=value, ...), by the properties of a class of C++; arrays to three digits, times to ms."""
 
     def text(value: Any) -> str:
         if hasattr(value, "dtype"):
             import numpy
 
             return numpy.array2string(value, precision=3, threshold=8, separator=", ")
-        return f"{value:.6g}" if isinstance(value, float) else repr(value)
+        return f"{value:.13g}" if isinstance(value, float) else repr(value)
 
     names = [name for name, of in vars(type(shown)).items() if isinstance(of, property)]
     return f"{type(shown).__name__}({', '.join(f'{name}={text(getattr(shown, name))}' for name in names)})"

@@ -49,6 +49,57 @@ def test_arrays_that_were_checked_stay() -> None:
     assert recording[1:].object == "mug"
 
 
+@pytest.mark.parametrize(
+    ("reshaped", "shape", "named"),
+    [
+        ("pressure", (24,), "pressure"),
+        ("pressure", (6, 4), "T_robot_sensor"),  # which has no six rows
+        ("T_robot_sensor", (12,), "T_robot_sensor"),
+        ("elements_mm", (2, 6), "elements_mm"),
+        ("valid", (24,), "valid"),
+    ],
+)
+def test_arrays_that_are_changed_in_place_are_refused_at_use(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid], reshaped: str, shape: tuple[int, ...],
+    named: str,
+) -> None:  # fmt: skip
+    belief = palpate.PoseHistogram(device, maps)
+    recording = palpate.Recording(**arrays(), valid=numpy.ones((4, 6), bool))
+    getattr(recording, reshaped).shape = shape
+    for use in (belief.update, lambda given: given.save("none.h5"),
+                lambda given: palpate.recognize(given, maps)):  # fmt: skip
+        assert error_of(use, recording) == f"{named}: was given another shape; make another Recording"
+
+
+def test_a_touch_that_is_changed_in_place_is_refused_at_use(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid]
+) -> None:
+    belief = palpate.PoseHistogram(device, maps)
+    touch = palpate.Touch((0, 0, 0), GRID, numpy.zeros(6))
+    touch.pressure.shape = (2, 3)
+    assert error_of(belief.update, [touch]) == "pressure: was given another shape; make another Touch"
+    touch.pressure.shape = (6,)
+    touch.pressure.dtype = numpy.dtype("int64")
+    with pytest.raises(TypeError, match="pressure: was given another dtype"):
+        belief.update(touch)
+
+
+def test_attributes_of_another_type_are_refused_at_once() -> None:
+    recording = palpate.Recording(**arrays())
+    others = {"object": 3, "pressure_unit": None, "rows": b"touches", "sensor": 1, "serial": 7}
+    for name, value in others.items():
+        with pytest.raises(TypeError, match=f"^{name}: {value!r}; give str$"):
+            palpate.Recording(**arrays(), **{name: value})
+    for change in (lambda: palpate.Recording(**arrays(), truth="E"),
+                   lambda: setattr(recording, "truth", "E")):  # fmt: skip
+        with pytest.raises(TypeError, match=r"^truth: 'E'; give Truth \| None$"):
+            change()
+    with pytest.raises(TypeError, match="^object: None; give str$"):
+        recording.object = None
+    recording.truth = palpate.Truth("E", (0, 0, 0))
+    recording.truth = None
+
+
 def test_a_slice_has_the_rows_of_every_array() -> None:
     rows = {"valid": numpy.eye(4, 6, dtype=bool), "time_s": numpy.arange(4.0),
             "device_time_s": numpy.arange(4.0) * 2, "lost_before": numpy.arange(4)}  # fmt: skip
@@ -161,12 +212,23 @@ def test_results_are_views_that_keep_their_memory(
     belief.update(unknown)
     identity = belief.estimate().identity  # of an Estimate that nothing else keeps
     xy = belief.marginals(1).xy
+    cells = palpate.OccupancyGrid("A", numpy.ones((3, 4)), cell_mm=1, origin_mm=(0, 0)).log_odds
     for _ in range(100):
         numpy.ones(3)
     assert identity.sum() == pytest.approx(1.0, abs=1e-12)
+    assert (cells == 1).all()
     assert xy.shape == (25, 25)
     assert xy.sum() == pytest.approx(identity[1], abs=1e-6)
     assert belief.log_likelihood(0).shape == belief.lattice.shape == (16, 25, 25)
+
+
+def test_poses_compose() -> None:
+    T_a_b, T_b_c = numpy.array([1.0, 2.0, 0.3]), numpy.array([-4.0, 5.0, 2.0])
+    points = numpy.array([[0.0, 0.0], [3.0, -1.0]])
+    T_a_c = palpate.compose(T_a_b, T_b_c)
+    both = palpate.transform(T_a_b, palpate.transform(T_b_c, points))
+    assert numpy.allclose(both, palpate.transform(T_a_c, points), atol=1e-12)
+    assert numpy.allclose(palpate.compose(T_a_c, palpate.inverse(T_a_c)), 0, atol=1e-12)
 
 
 def test_what_is_no_touch_is_refused(device: palpate.Device, maps: list[palpate.OccupancyGrid]) -> None:

@@ -58,6 +58,7 @@ def test_poses_in_space_are_taken_into_the_plane(plain: pathlib.Path, tmp_path: 
         given, said = warned(palpate.import_tables, plain, **table, **options)
         assert "its y is turned over" in said
         assert given.T_robot_sensor[0].tolist() == [1, 2, 0]
+        assert given.elements_mm[0].tolist() == [-0.5, 0.5], "seen from above"
     assert error_of(palpate.import_tables, plain, **table, plane=(0, 0, 0)).startswith("plane=(0, 0, 0): give auto")
 
 

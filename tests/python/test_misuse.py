@@ -1,11 +1,13 @@
 """What is misused raises the exception that Python has for it, and no call ends the process; without Vulkan, all
 that needs no device works."""
 
+import gc
 import inspect
 import os
 import pathlib
 import subprocess
 import sys
+import weakref
 from typing import Any
 
 import numpy
@@ -13,7 +15,7 @@ import pytest
 from conftest import error_of
 
 import palpate
-from palpate import _palpate
+from palpate import _palpate, reference
 from palpate.recognition import RecognitionOptions
 
 
@@ -90,6 +92,18 @@ def test_what_a_path_raises_is_raised(tmp_path: pathlib.Path) -> None:
                 use(path)
 
 
+def test_a_proxy_to_what_is_gone_is_refused(
+    device: palpate.Device, maps: list[palpate.OccupancyGrid]
+) -> None:
+    gone = weakref.proxy(RECORDING[:2])
+    gc.collect()
+    for use in (palpate.PoseHistogram(device, maps).update, lambda gone: palpate.recognize(gone, maps),
+                lambda gone: _palpate.write_recording("none.h5", gone),
+                lambda gone: reference.classify(gone, palpate.ContactClassifier())):  # fmt: skip
+        with pytest.raises((ReferenceError, TypeError)):
+            use(gone)
+
+
 def test_a_flag_of_another_type_is_refused_by_name() -> None:
     flags: list[tuple[str, Any, str]] = [
         ("seed", -1, "int"), ("prior", "a", "float"), ("touches", 1.5, "int"), ("bins", 3, "tuple"),
@@ -98,6 +112,10 @@ def test_a_flag_of_another_type_is_refused_by_name() -> None:
     for name, value, wanted in flags:
         with pytest.raises(TypeError, match=f"^{name}: {value!r}; give .*{wanted}"):
             palpate.recognize(RECORDING, (), **{name: value})
+
+
+def test_a_bad_option_is_told_before_recordings_are_read(maps: list[palpate.OccupancyGrid]) -> None:
+    assert error_of(palpate.recognize, "none.h5", maps, scene="none.yaml").startswith("none.yaml: ")
 
 
 def test_progress_and_timeouts_are_checked_before_the_work(

@@ -28,6 +28,7 @@ def test_texts_tell_what_an_object_is(
     assert repr(maps[0]).startswith("OccupancyGrid('A', ")
     assert repr(unknown) == "Recording(9 touches of 36 elements in kPa)"
     assert repr(unknown[0]).startswith("Touch(36 elements at x ")
+    assert "host_time_s=1764123456.789, " in repr(palpate.Frame(1764123456.789, [0.0]))
     belief = palpate.PoseHistogram(device, maps)
     assert repr(belief) == f"PoseHistogram(A, E, I on '{device.name}')"
     belief.update(unknown)
