@@ -1,28 +1,33 @@
 #include "cli/interruption.hpp"
 
-#include <csignal>
-#include <initializer_list>
-
 namespace palpate::cli {
 
 namespace {
 
-volatile std::sig_atomic_t signal_came = 0;
+constexpr int signals[] = {SIGINT, SIGHUP, SIGTERM};
+
+volatile std::sig_atomic_t interrupted = 0;
 
 }  // namespace
 
-void catch_interruptions() {
+Interruption::Interruption() {
+  interrupted = 0;
   struct sigaction action {};  // without SA_RESTART: a read that waits ends
-  action.sa_handler = [](int) { signal_came = 1; };
-  for (const int signal : {SIGINT, SIGHUP, SIGTERM}) {
-    struct sigaction before {};
-    ::sigaction(signal, nullptr, &before);
-    if (before.sa_handler != SIG_IGN) {  // nohup wants SIGHUP ignored
-      ::sigaction(signal, &action, nullptr);
+  action.sa_handler = [](int) { interrupted = 1; };
+  for (int i = 0; i < 3; ++i) {
+    ::sigaction(signals[i], &action, &before_[i]);
+    if (before_[i].sa_handler == SIG_IGN) {
+      ::sigaction(signals[i], &before_[i], nullptr);  // nohup wants SIGHUP ignored
     }
   }
 }
 
-bool interrupted() { return signal_came != 0; }
+Interruption::~Interruption() {
+  for (int i = 0; i < 3; ++i) {
+    ::sigaction(signals[i], &before_[i], nullptr);
+  }
+}
+
+bool Interruption::requested() const { return interrupted != 0; }
 
 }  // namespace palpate::cli

@@ -186,7 +186,7 @@ void live(const LiveArguments& options) {
   // Where the reader of our output ends, writing fails with an error as on a full disk; SIGPIPE
   // would end the program silently.
   std::signal(SIGPIPE, SIG_IGN);
-  catch_interruptions();
+  const Interruption interruption;
   const bool to_program = options.json == "-";
   std::FILE* const people = to_program ? stderr : stdout;
   std::optional<LivePage> page;
@@ -195,8 +195,9 @@ void live(const LiveArguments& options) {
     fmt::print(people, "{}\n", page->words());
     std::fflush(people);
   }
+  const LiveTable table(task);
   if (!to_program) {
-    fmt::print("{}", table_heading(task));
+    fmt::print("{}", table.heading());
     std::fflush(stdout);
   }
   bool resolved = true;  // nothing was said yet
@@ -235,7 +236,7 @@ void live(const LiveArguments& options) {
       page->add(touch);
     }
     if (!to_program) {
-      fmt::print("{}", table_line(touch, task));
+      fmt::print("{}", table.line(touch));
       std::fflush(stdout);
     }
   };
@@ -245,7 +246,7 @@ void live(const LiveArguments& options) {
   }
   LiveState state;
   // A page stays to be looked at.
-  while (!interrupted() && !recognition.failed()) {
+  while (!interruption.requested() && !recognition.failed()) {
     if (recognition.wait_for_end(40ms)) {
       if (!page) {
         break;
@@ -265,7 +266,7 @@ void live(const LiveArguments& options) {
 
   state = recognition.state();
   judge_frames(state);
-  if (state.all_touches == 0 && state.without_pose > 0 && !interrupted()) {
+  if (state.all_touches == 0 && state.without_pose > 0 && !interruption.requested()) {
     refuse(source, "none of its {} touches has a pose; give --poses{}", state.without_pose,
            opened.lines != nullptr ? ", or x_mm, y_mm and theta_rad in its lines" : "");
   }

@@ -46,10 +46,10 @@ class FrameRecording {
     }
   }
 
-  void record(Sensor& sensor, std::optional<double> seconds) {
+  void record(Sensor& sensor, std::optional<double> seconds, const Interruption& interruption) {
     StreamTime time;
     Clock::time_point heard = Clock::now();
-    while (!interrupted()) {
+    while (!interruption.requested()) {
       if (const std::optional<Frame> frame = sensor.next(100ms)) {
         heard = Clock::now();
         const double elapsed_s = time.advance(frame->host_time_s);
@@ -153,11 +153,11 @@ void record(const RecordArguments& options) {
     description.object = options.object;
   }
 
-  catch_interruptions();
+  const Interruption interruption;
   FrameRecording recording(options.output, description,
                            description.baseline.empty() ? options.tare_s : 0.0);
   sensor.start();
-  recording.record(sensor, options.seconds);
+  recording.record(sensor, options.seconds, interruption);
   sensor.stop();
   fmt::print("{}: {}\n", options.output, recording.close(options.sensor));
   report_refused(opened);

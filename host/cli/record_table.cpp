@@ -10,7 +10,6 @@
 #include <fmt/ranges.h>
 
 #include "cli/step_words.hpp"
-#include "cli/text_table.hpp"
 #include "model/printable.hpp"
 #include "recognition/record_json.hpp"
 
@@ -186,13 +185,6 @@ std::string symmetries(const std::vector<RecognitionRecord>& records, const Reco
   return text;
 }
 
-/// The table of `live`.
-TextTable live_table(const RecognitionTask& task) {
-  const std::size_t dropped = traits_of(task.filter).certificate ? 7 : 0;
-  return TextTable(
-      step_columns({{"unknown", true, 7}, {"touch", true, 5}}, {"latency ms", true, 10}, dropped));
-}
-
 }  // namespace
 
 std::string dropped_text(const RecognitionStep& step) {
@@ -316,46 +308,20 @@ std::string result_table(const std::vector<RecognitionRecord>& records,
          symmetries(records, task) + summary(records) + confusions(records, task);
 }
 
-nlohmann::ordered_json to_json(const LiveTouch& touch, const RecognitionTask& task) {
-  const Pose& pose = *touch.touch.T_robot_sensor;
-  nlohmann::ordered_json json{{"time", 0.5 * (touch.touch.begin_s + touch.touch.end_s)},
-                              {"unknown", touch.unknown},
-                              {"touch", touch.index},
-                              {"pose",
-                               {{"x_mm", pose.translation_mm.x},
-                                {"y_mm", pose.translation_mm.y},
-                                {"theta_rad", pose.theta_rad}}}};
-  json.update(to_json(touch.step, task));
-  if (!touch.step.truth.label.empty()) {
-    json["truth"] = truth_to_json(touch.step.truth);
-  }
-  json["latency_ms"] = touch.latency_ms;
-  json["frames_lost"] = touch.frames_lost;
-  if (!touch.left_out.empty()) {
-    json["left_out"] = touch.left_out;
-  }
-  return json;
-}
+LiveTable::LiveTable(const RecognitionTask& task)
+    : task_(task),
+      table_(step_columns({{"unknown", true, 7}, {"touch", true, 5}}, {"latency ms", true, 10},
+                          traits_of(task.filter).certificate ? 7 : 0)) {}
 
-std::string plan_line(const LiveTouch& touch) {
-  nlohmann::ordered_json json{
-      {"unknown", touch.unknown}, {"touch", touch.index}, {"next", to_json(touch.next.value())}};
-  json["next"].erase("index");  // of a grid that nobody else knows
-  return text_of(json);
-}
+std::string LiveTable::heading() const { return table_.line(table_.headings()); }
 
-std::string table_heading(const RecognitionTask& task) {
-  const TextTable table = live_table(task);
-  return table.line(table.headings());
-}
-
-std::string table_line(const LiveTouch& touch, const RecognitionTask& task) {
+std::string LiveTable::line(const LiveTouch& touch) const {
   TextTable::Row row =
       step_cells({fmt::format("{}", touch.unknown + 1), fmt::format("{}", touch.index + 1)},
-                 touch.step, task, fmt::format("{:.2f}", touch.latency_ms));
+                 touch.step, task_, fmt::format("{:.2f}", touch.latency_ms));
   std::ranges::replace(row, std::string(), "-");
-  row.back() += touch.step.decision.act ? ", act" : "";
-  return live_table(task).line(row);
+  row.back() += touch.step.decision.act ? ", act" : "";  // "fit" is last
+  return table_.line(row);
 }
 
 std::string summary(const LiveState& state, std::vector<double> latencies_ms,

@@ -14,6 +14,12 @@ namespace palpate::cli {
 
 namespace {
 
+TextTable::Row printable_cells(const TextTable::Row& cells) {
+  TextTable::Row row;
+  std::ranges::transform(cells, std::back_inserter(row), printable);
+  return row;
+}
+
 bool begins_character(char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }
 
 std::size_t columns_of(std::string_view text) {
@@ -70,10 +76,7 @@ std::string tally(std::vector<std::pair<std::string, std::size_t>> answers) {
 
 TextTable::TextTable(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
-void TextTable::add(const Row& cells) {
-  Row& row = rows_.emplace_back();
-  std::ranges::transform(cells, std::back_inserter(row), printable);
-}
+void TextTable::add(const Row& cells) { rows_.push_back(printable_cells(cells)); }
 
 TextTable::Row TextTable::headings() const {
   Row row;
@@ -84,7 +87,7 @@ TextTable::Row TextTable::headings() const {
 std::string TextTable::line(const Row& cells) const {
   std::vector<std::size_t> widths;
   std::ranges::transform(columns_, std::back_inserter(widths), &Column::width);
-  return line(cells, widths);
+  return line(printable_cells(cells), widths);
 }
 
 std::string TextTable::line(const Row& cells, const std::vector<std::size_t>& widths) const {

@@ -33,10 +33,10 @@ void view(const ViewArguments& options) {
                            throw Error(Fault::input, "saved files are only looked at");
                          }});
   server.feed().set("files", files.list());
-  catch_interruptions();
+  const Interruption interruption;
   fmt::print("{}; Ctrl-C ends it\n", server.words());
   std::fflush(stdout);
-  while (!interrupted()) {
+  while (!interruption.requested()) {
     std::this_thread::sleep_for(50ms);
   }
 }

@@ -1,3 +1,5 @@
+#include "recognition/decision.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -8,7 +10,6 @@
 #include "model/body_spread.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "recognition/label_probability.hpp"
-#include "recognition/recognition_record.hpp"
 #include "recognition/scales.hpp"
 
 namespace palpate {

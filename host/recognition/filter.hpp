@@ -35,7 +35,8 @@ struct FilterTraits {
   /// Keeps touches, searches on the host once it is asked about the belief, and proves what it left
   /// out (Certificate).
   bool certificate = false;
-  /// How far a touch may be displaced; none with particles, which take touches as undisplaced.
+  /// How far a touch may be displaced; none with particles, which take every touch's pose to be
+  /// exact.
   DisplacementSd touch_sd = {};
   /// How far the object may move between two touches; none with bounds, and with particles, whose
   /// motion noise is not meant.

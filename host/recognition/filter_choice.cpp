@@ -69,7 +69,10 @@ ParticleOptions asked_particles(const Request& request, const HistogramOptions& 
 /// The filter by the wish and the options alone, on the region's bins.
 ChosenFilter asked_filter(Asked& asked, const FilterWish& wish, const HistogramOptions& histogram) {
   const Request& request = asked.request;
+  const std::string& every_bin_for = asked.of.every_bin_for;
   const bool by_histogram = wish.kind == FilterKind::histogram;
+  const bool by_bounds =
+      wish.kind == FilterKind::bounded || (!by_histogram && every_bin_for.empty());
   if (wish.kind == FilterKind::particles) {
     return {asked_particles(request, histogram), wish.by};
   }
@@ -79,15 +82,14 @@ ChosenFilter asked_filter(Asked& asked, const FilterWish& wish, const HistogramO
                     "has no effect where objects slip, as the histogram alone follows them; leave "
                     "it out");
     }
-    if (!by_histogram) {
+    if (by_bounds) {
       asked.remarks.emplace_back(
           "objects that slip are followed by the histogram, over every bin; `filter histogram` "
           "says so");
     }
     return {histogram, ""};
   }
-  const std::string& every_bin_for = asked.of.every_bin_for;
-  if (wish.kind == FilterKind::bounded || (!by_histogram && every_bin_for.empty())) {
+  if (by_bounds) {
     return {asked_bounds(request, histogram), wish.by};
   }
   // What would have to go for bounds to take the bins.

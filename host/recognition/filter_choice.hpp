@@ -12,7 +12,8 @@ namespace palpate {
 
 // The last step of resolve(): the filter and its bins.
 
-/// What resolve() is given, and the sentences that it has for the user.
+/// What every step of resolve() reads of what is asked, and the sentences for the user to which a
+/// step may add.
 struct Asked {
   const Request& request;
   const Circumstances& of;
@@ -34,7 +35,7 @@ struct ChosenFilter {
 };
 /// The filter that is wished for, on the bins that are used: those settled before, chosen, or
 /// given. Automatic is bounds, but the histogram where objects slip, where an option reads every
-/// bin, and where bounds have no room.
+/// bin, and where the search would take too much memory.
 /// @param histogram what was settled by the steps before
 /// @param width by which counts are chosen; none where they are given
 /// @throws Error on values out of range, and where the filter has no use for an option
@@ -64,7 +65,7 @@ ChosenBins chosen_bins(const DeviceSource& device, std::span<const Hypothesis> h
 FilterOptions with_evidence(FilterOptions filter, const LearnedSensor& sensor,
                             bool honour_tolerance = false);
 
-/// Whether the machine has room for a bounded posterior.
+/// Whether the machine has the memory for a bounded posterior.
 /// @throws Error on a lattice out of range
 bool bounds_have_room(std::span<const Hypothesis> hypotheses, BoundedOptions options);
 

@@ -14,6 +14,7 @@
 #include "palpate/error.hpp"
 #include "palpate/object_frame.hpp"
 #include "palpate/pose_error.hpp"
+#include "recognition/decision.hpp"
 #include "recognition/label_probability.hpp"
 #include "recognition/object_fit.hpp"
 #include "recognition/placement_judge.hpp"

@@ -7,26 +7,57 @@
 
 namespace palpate {
 
+namespace {
+
+/// RecognitionTask::labels
+std::vector<std::string> labels_in(const std::vector<Hypothesis>& hypotheses, bool with_none) {
+  std::vector<std::string> labels;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const std::string& label = hypothesis.map.label;
+    if (std::ranges::find(labels, label) == labels.end()) {
+      labels.push_back(label);
+    }
+  }
+  if (with_none) {
+    labels.emplace_back(none_label);
+  }
+  return labels;
+}
+
+/// RecognitionTask::label_of
+std::vector<std::size_t> label_indices(const std::vector<Hypothesis>& hypotheses,
+                                       const std::vector<std::string>& labels) {
+  std::vector<std::size_t> indices;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const auto known = std::ranges::find(labels, hypothesis.map.label);
+    indices.push_back(static_cast<std::size_t>(known - labels.begin()));
+  }
+  return indices;
+}
+
+/// RecognitionTask::bodies
+std::vector<std::optional<Body>> bodies_in(const std::vector<Hypothesis>& hypotheses) {
+  std::vector<std::optional<Body>> bodies;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    const OccupancyGrid& map = hypothesis.map;
+    const bool occupied = std::ranges::any_of(map.log_odds, [](float l) { return l > 0.0F; });
+    bodies.push_back(occupied ? std::optional(body_of(map)) : std::nullopt);
+  }
+  return bodies;
+}
+
+}  // namespace
+
 std::size_t touches_in_contact(std::span<const TouchEvidence> touches) {
   return static_cast<std::size_t>(std::ranges::count_if(touches, &TouchEvidence::in_contact));
 }
 
 RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, FilterOptions options)
-    : hypotheses(std::move(objects)), filter(std::move(options)) {
-  for (const Hypothesis& hypothesis : hypotheses) {
-    const OccupancyGrid& map = hypothesis.map;
-    const auto known = std::ranges::find(labels, map.label);
-    label_of.push_back(static_cast<std::size_t>(known - labels.begin()));
-    if (known == labels.end()) {
-      labels.push_back(map.label);
-    }
-    const bool occupied = std::ranges::any_of(map.log_odds, [](float l) { return l > 0.0F; });
-    bodies.push_back(occupied ? std::optional(body_of(map)) : std::nullopt);
-  }
-  if (traits_of(filter).none_weight) {
-    labels.emplace_back(none_label);
-  }
-}
+    : hypotheses(std::move(objects)),
+      filter(std::move(options)),
+      labels(labels_in(hypotheses, traits_of(filter).none_weight.has_value())),
+      label_of(label_indices(hypotheses, labels)),
+      bodies(bodies_in(hypotheses)) {}
 
 std::int64_t RecognitionTask::bins_in_all() const {
   // In float64, as counts of three axes may exceed an integer.

@@ -56,10 +56,10 @@ struct RecognitionTask {
   const FilterOptions filter;  ///< as it is opened
   /// Each label once, in the order of the maps; none_label comes last where "none of these" has a
   /// weight.
-  std::vector<std::string> labels = {};
-  std::vector<std::size_t> label_of = {};  ///< [hypothesis] index into labels
+  const std::vector<std::string> labels;
+  const std::vector<std::size_t> label_of;  ///< [hypothesis] index into labels
   /// [hypothesis] the occupied cells of its map; none where no cell is.
-  std::vector<std::optional<Body>> bodies = {};
+  const std::vector<std::optional<Body>> bodies;
   std::vector<std::string> map_paths = {};  ///< [hypothesis] file of the map; empty without files
   /// What chose the filter, such as "`filter auto`" or "`posterior`"; "" where objects slip, which
   /// the histogram alone follows.

@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "recognition/live_recognition.hpp"
+
 namespace palpate {
 
 namespace {
@@ -315,6 +317,34 @@ Json to_json(const SetupFinding& finding, OptionWords words) {
     json["sd"] = *finding.sd;
   }
   return json;
+}
+
+Json to_json(const LiveTouch& touch, const RecognitionTask& task) {
+  const Pose& pose = *touch.touch.T_robot_sensor;
+  Json json{{"time", 0.5 * (touch.touch.begin_s + touch.touch.end_s)},
+            {"unknown", touch.unknown},
+            {"touch", touch.index},
+            {"pose",
+             {{"x_mm", pose.translation_mm.x},
+              {"y_mm", pose.translation_mm.y},
+              {"theta_rad", pose.theta_rad}}}};
+  json.update(to_json(touch.step, task));
+  if (!touch.step.truth.label.empty()) {
+    json["truth"] = truth_to_json(touch.step.truth);
+  }
+  json["latency_ms"] = touch.latency_ms;
+  json["frames_lost"] = touch.frames_lost;
+  if (!touch.left_out.empty()) {
+    json["left_out"] = touch.left_out;
+  }
+  return json;
+}
+
+std::string plan_line(const LiveTouch& touch) {
+  Json json{
+      {"unknown", touch.unknown}, {"touch", touch.index}, {"next", to_json(touch.next.value())}};
+  json["next"].erase("index");  // of a grid that nobody else knows
+  return text_of(json);
 }
 
 std::string text_of(const Json& json, int indent) {

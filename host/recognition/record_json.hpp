@@ -14,6 +14,8 @@
 
 namespace palpate {
 
+struct LiveTouch;
+
 /// "fits", "doubtful" or "does not fit".
 std::string verdict_text(Verdict verdict);
 
@@ -30,7 +32,15 @@ nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTas
 nlohmann::ordered_json to_json(const RecognitionRecord& record, const RecognitionTask& task,
                                const std::optional<std::string>& device, bool with_trace,
                                OptionWords words = in_flags);
-// What other commands tell, in the form that other programs rely on.
+
+// What commands other than recognize tell, in the form that other programs rely on.
+
+/// One touch as JSON: time (the middle of the steady phase, seconds since the Unix
+/// epoch), unknown and touch (counted from 0), pose (T_robot_sensor), the fields that `recognize`
+/// writes of an estimate, latency_ms, frames_lost and, where touches were left out, left_out.
+nlohmann::ordered_json to_json(const LiveTouch& touch, const RecognitionTask& task);
+/// A line of JSON for the plan that follows a touch: unknown and touch as above, and next.
+std::string plan_line(const LiveTouch& touch);
 
 /// The fields of scores from `records` to `reliability`.
 nlohmann::ordered_json to_json(const Scores& scores);

@@ -251,8 +251,6 @@ NoneOfThese none_of_these(const Request& request, const LearnedSensor& sensor, c
   return {.weight = odds * sum};
 }
 
-// 5. The filter: choose_filter().
-
 /// By Eq. 7 with "(none)" left out all touches multiply, as in the paper; and where the object
 /// slips, a touch of the same place tells where it went.
 bool counts_by_place(const Request& request, const RecognitionTask& task) {
@@ -260,6 +258,8 @@ bool counts_by_place(const Request& request, const RecognitionTask& task) {
   const bool as_in_the_paper = task.sensor.file.empty() && none != nullptr && *none == 0.0;
   return !as_in_the_paper && task.slip_sd().none();
 }
+
+// 5. The filter: choose_filter().
 
 }  // namespace
 

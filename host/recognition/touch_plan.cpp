@@ -214,12 +214,12 @@ std::vector<Pose> candidate_grid(std::span<const PoseSample> samples, const Reco
 }
 
 void require_reachable(const std::string& source, std::span<const Pose> candidates) {
-  constexpr std::size_t upper_bound = 1'000'000;
+  constexpr std::size_t most_candidates = 1'000'000;
   if (candidates.empty()) {
     refuse(source, "holds no pose; write one for each candidate touch");
   }
-  if (candidates.size() > upper_bound) {
-    refuse(source, "holds {} poses; give at most {}", candidates.size(), upper_bound);
+  if (candidates.size() > most_candidates) {
+    refuse(source, "holds {} poses; give at most {}", candidates.size(), most_candidates);
   }
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     const Pose& pose = candidates[i];
@@ -286,12 +286,12 @@ std::string limit_words(const Plan& plan) {
   constexpr double near_nats = 0.5;
   const double gain = gain_for(plan.ranked.front().gain, plan.goal);
   const auto samples = plan.samples.size();
-  const double upper_bound = std::log(static_cast<double>(samples));
-  if (gain > upper_bound - near_nats) {
+  const double most_nats = std::log(static_cast<double>(samples));
+  if (gain > most_nats - near_nats) {
     return fmt::format(
         "{} samples cannot show more than {:.2f} nats, and the best gain is near that: the first "
         "candidates may not be in order; give more `samples`",
-        samples, upper_bound);
+        samples, most_nats);
   }
   const TouchGain unknown{.identity = plan.identity_nats,
                           .pose = plan.both_nats - plan.identity_nats};

@@ -140,7 +140,7 @@ class Run:
 def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
     """Recognises all unknowns by bounds, and some by the histogram.
 
-    All by the histogram where bounds have no room for what the options ask, or objects slip.
+    All by the histogram where the search by bounds would take too much memory, or objects slip.
     """
     unknowns = sum(count for _, count in data.entries)
     in_all = lattice.bins * len(data.maps)

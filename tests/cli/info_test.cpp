@@ -47,8 +47,8 @@ TEST_F(InfoCommand, Recording) {
   recording.pressure_unit = "raw";
   recording.time_s = {1.7e9, 1.7e9 + 2.5};
   recording.elements_mm.resize(72);
-  expect_info(recording, {"frames            2", "raw", "positions change", "2.500 s",
-                          "in contact        not known"});
+  expect_info(recording, {"frames            2", "raw", "positions change per touch", "2.500 s",
+                          "not known: raw pressure has no default threshold"});
 }
 
 TEST_F(InfoCommand, SuspicionsComeLast) {

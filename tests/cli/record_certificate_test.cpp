@@ -102,10 +102,10 @@ TEST(Certificate, IsSaidWhereProbabilitiesAre) {
   touch.touch.T_robot_sensor = Pose{};
   touch.step = wide.last();
   EXPECT_THAT(summary(state, {}, task), HasSubstr("\n" + sentence + "\n"));
-  EXPECT_THAT(table_heading(task), HasSubstr("prob.  dropped"));
-  EXPECT_THAT(table_line(*state.last, task), HasSubstr("0.620        1"));
-  const std::string heading = table_heading(task);
-  EXPECT_EQ(table_line(*state.last, task).find(" 0.00 "), heading.find("x mm") - 1)
+  EXPECT_THAT(LiveTable(task).heading(), HasSubstr("prob.  dropped"));
+  EXPECT_THAT(LiveTable(task).line(*state.last), HasSubstr("0.620        1"));
+  const std::string heading = LiveTable(task).heading();
+  EXPECT_EQ(LiveTable(task).line(*state.last).find(" 0.00 "), heading.find("x mm") - 1)
       << "columns stand below their names\n"
       << heading;
 

@@ -134,7 +134,7 @@ TEST(ResultTable, GivesThePoseItsOwnShareOfTheBelief) {
             "  mode              A                    399.00        -20.00        31.51\n");
   EXPECT_EQ(identity_words(step, task), "I (58.0 %), pose of A (15.2 % there)");
   LiveTouch touch{.touch = {.T_robot_sensor = Pose{}}, .step = step};
-  EXPECT_THAT(table_line(touch, task), HasSubstr("I, pose of A  0.580    0.152 "));
+  EXPECT_THAT(LiveTable(task).line(touch), HasSubstr("I, pose of A  0.580    0.152 "));
   step.best = 0;
   step.places.share = 0.25;
   EXPECT_EQ(identity_words(step, task), "A (40.0 %, 25.0 % there)");
@@ -328,9 +328,9 @@ TEST(RecordOutput, SaysTheSameNumbersEverywhere) {
                                "\nthe poses look like metres\n"))
       << summary(state, {}, task);
   for (const char* part : {" 398.76+-0.05 ", " -20.50+-0.10 ", " 28.65+-0.57 ", "no fit"}) {
-    EXPECT_THAT(table_line(*state.last, task), HasSubstr(part));
+    EXPECT_THAT(LiveTable(task).line(*state.last), HasSubstr(part));
   }
-  EXPECT_THAT(table_line(*state.last, task), HasSubstr(" " + error + " "));
+  EXPECT_THAT(LiveTable(task).line(*state.last), HasSubstr(" " + error + " "));
   const nlohmann::json live = to_json(*state.last, task);
   for (const char* key : {"refined", "truth", "fit", "warnings", "refined_error_mm"}) {
     EXPECT_EQ(live.at(key), json.at(key)) << key;

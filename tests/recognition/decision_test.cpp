@@ -13,7 +13,7 @@
 
 #include "estimation/lattice/refinement.hpp"
 #include "recognition/belief_modes.hpp"
-#include "recognition/recognition_record.hpp"
+#include "recognition/decision.hpp"
 #include "shapes.hpp"
 #include "support/unknown_of.hpp"
 

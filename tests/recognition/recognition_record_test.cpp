@@ -279,6 +279,15 @@ TEST(TakeStep, JudgesTheRefinedPoseToo) {
   EXPECT_EQ(step.pose_error_mm(), step.refined_error_mm);
 }
 
+TEST(PartialTruth, IsTheTruthOrElseTheObjectThatIsNamed) {
+  const PartialTruth named = partial_truth("L", {});
+  EXPECT_EQ(named.label, "L");
+  EXPECT_FALSE(named.T_object_robot);
+  const PartialTruth known = partial_truth("", Truth{.object = "disc", .T_object_robot = {}});
+  EXPECT_EQ(known.label, "disc");
+  EXPECT_TRUE(known.T_object_robot);
+}
+
 TEST(RecordJson, HasFitAndWarningsWhereTheStepHas) {
   RecognitionTask task(shapes(), every_filter()[0]);
   task.map_paths.assign(task.hypotheses.size(), "shape.map.h5");

@@ -113,11 +113,13 @@ TEST(Resolve, AnOptionOfBoundsAsksForBounds) {
 }
 
 TEST(Resolve, ObjectsThatSlipAreFollowedByTheHistogramWhichIsSaidWhereItWasNotAskedFor) {
-  const auto said = [](FilterKind filter) {
-    const RecognitionTask task = task_of(changed([&](Request& r) {
+  const auto said = [](FilterKind filter, const std::string& every_bin_for = "") {
+    const Request request = changed([&](Request& r) {
       r.slip_sd_deg = 2.0;
       r.filter = filter;
-    }));
+    });
+    const RecognitionTask task = resolve(
+        request, {.pressure_unit = "kPa", .source = "a test", .every_bin_for = every_bin_for});
     EXPECT_DOUBLE_EQ(std::get<HistogramOptions>(task.filter).slip_sd.rad,
                      2.0 * std::numbers::pi / 180.0);
     return testing::Value(task.remarks, testing::Contains(HasSubstr("followed by the histogram")));
@@ -125,6 +127,9 @@ TEST(Resolve, ObjectsThatSlipAreFollowedByTheHistogramWhichIsSaidWhereItWasNotAs
   EXPECT_TRUE(said(FilterKind::automatic));
   EXPECT_TRUE(said(FilterKind::bounded));
   EXPECT_FALSE(said(FilterKind::histogram));
+  EXPECT_FALSE(said(FilterKind::automatic, "posterior"))
+      << "for which the histogram is taken anyway";
+  EXPECT_TRUE(said(FilterKind::bounded, "posterior"));
 }
 
 TEST(Resolve, CountsThatWereSettledBeforeStand) {

@@ -8,6 +8,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "recognition/decision.hpp"
 #include "recognition/warnings.hpp"
 #include "shapes.hpp"
 

@@ -27,7 +27,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Of unknowns that have been read; one may be larger.
+/// Most bytes of unknowns that have been read and wait to be recognised; a single one may be
+/// larger.
 constexpr std::size_t most_waiting_bytes = 64 << 20;
 /// How often progress is shown where nothing else happens.
 constexpr auto pause = 200ms;
@@ -94,16 +95,17 @@ class Pipeline {
     recognisers_left_ = recognisers_;
     readers_left_ = (recognisers_ + 1) / 2;
     std::vector<std::jthread> threads;
-    for (std::size_t i = readers_left_; i > 0; --i) {
-      threads.emplace_back([this] { guard([this] { read(); }, readers_left_); });
-    }
-    for (std::size_t i = 0; i < recognisers_; ++i) {
-      threads.emplace_back(
-          [this, i] { guard([this, i] { recognise_unknowns(i == 0); }, recognisers_left_); });
-    }
-    for (std::unique_lock lock(mutex_); recognisers_left_ > 0;) {
-      changed_.wait_for(lock, pause);
-      progress(counts_);
+    try {
+      for (std::size_t i = (recognisers_ + 1) / 2; i > 0; --i) {
+        threads.emplace_back([this] { guard([this] { read(); }, readers_left_); });
+      }
+      for (std::size_t i = 0; i < recognisers_; ++i) {
+        threads.emplace_back(
+            [this, i] { guard([this, i] { recognise_unknowns(i == 0); }, recognisers_left_); });
+      }
+      tell_until_end(progress);
+    } catch (...) {
+      fail(std::current_exception());
     }
     threads.clear();  // joins
     if (failure_) {
@@ -115,19 +117,38 @@ class Pipeline {
  private:
   std::size_t chunk_of(std::size_t unknown) const { return unknown / run_.task.chunk_unknowns; }
 
-  /// Runs one of `left` threads. What it throws, if it is the first, ends all threads.
+  /// Without the mutex: the threads go on where whoever reads the progress does not.
+  void tell_until_end(const std::function<void(const BatchCounts&)>& progress) {
+    for (bool ended = false; !ended;) {
+      std::unique_lock lock(mutex_);
+      ended = ended_.wait_for(lock, pause, [this] { return recognisers_left_ == 0; });
+      const BatchCounts counts = counts_;
+      lock.unlock();
+      progress(counts);
+    }
+  }
+
+  /// The first failure ends all threads.
+  void fail(const std::exception_ptr& failure) {
+    const std::lock_guard lock(mutex_);
+    failure_ = failure_ ? failure_ : failure;
+    room_.notify_all();
+    arrived_.notify_all();
+  }
+
+  /// Runs one of `left` threads.
   template <typename Work>
   void guard(const Work& work, std::size_t& left) {
-    std::exception_ptr failure;
     try {
       work();
     } catch (...) {
-      failure = std::current_exception();
+      fail(std::current_exception());
     }
     const std::lock_guard lock(mutex_);
-    failure_ = failure_ ? failure_ : failure;
-    --left;
-    changed_.notify_all();
+    if (--left == 0) {
+      arrived_.notify_all();
+      ended_.notify_one();
+    }
   }
 
   bool is_wanted(std::size_t input) const {
@@ -167,7 +188,7 @@ class Pipeline {
   bool push(Job job) {
     const std::size_t bytes = bytes_of(job.unknown);
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] {
+    room_.wait(lock, [&] {
       return failure_ || waiting_.empty() || waiting_bytes_ + bytes <= most_waiting_bytes;
     });
     if (failure_) {
@@ -175,21 +196,21 @@ class Pipeline {
     }
     waiting_bytes_ += bytes;
     waiting_.push_back(std::move(job));
-    changed_.notify_all();
+    arrived_.notify_one();
     return true;
   }
 
   /// Waits for an unknown; none where all have been taken or another thread has failed.
   std::optional<Job> pop() {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return failure_ || !waiting_.empty() || readers_left_ == 0; });
+    arrived_.wait(lock, [&] { return failure_ || !waiting_.empty() || readers_left_ == 0; });
     if (failure_ || waiting_.empty()) {
       return {};
     }
     std::optional<Job> job(std::move(waiting_.front()));
     waiting_.pop_front();
     waiting_bytes_ -= bytes_of(job->unknown);
-    changed_.notify_all();
+    room_.notify_one();
     return job;
   }
 
@@ -267,8 +288,10 @@ class Pipeline {
   std::atomic<std::size_t> next_input_ = 0;
   std::atomic<bool> told_ = false;
 
-  std::mutex mutex_;  ///< of what follows
-  std::condition_variable changed_;
+  std::mutex mutex_;                 ///< of what follows
+  std::condition_variable room_;     ///< for one more unknown; readers wait for it
+  std::condition_variable arrived_;  ///< an unknown, or the last one; recognisers wait for it
+  std::condition_variable ended_;    ///< all recognisers
   std::deque<Job> waiting_;
   std::size_t waiting_bytes_ = 0;
   std::size_t readers_left_ = 0;

@@ -10,7 +10,8 @@
 #include "palpate/pose.hpp"
 
 // What the page draws, as JSON. Pictures are a number from 0 to 255 for each cell, row by row, the
-// lowest row first.
+// lowest row first: up to 4 bytes of text for a cell, three times as much as base64 takes, and
+// 16 bytes of memory while the text is written.
 
 namespace palpate::cli {
 

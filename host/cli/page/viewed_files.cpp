@@ -302,7 +302,7 @@ std::string ViewedFiles::list() const {
 }
 
 std::optional<std::string> ViewedFiles::get(const std::string& path) const {
-  static const std::regex form("/file/([0-9]{1,9})(/([a-z]+)/([0-9]{1,9}))?");
+  static const std::regex form("/file/([0-9]{1,9})(/(rows|record|map)/([0-9]{1,9}))?");
   std::smatch asked;
   if (!std::regex_match(path, asked, form) || std::stoul(asked[1]) >= files_.size()) {
     return {};

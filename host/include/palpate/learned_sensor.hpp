@@ -79,7 +79,7 @@ struct PALPATE_API LearnedSensor {
   std::string pressure_unit = "kPa";
   double noise = 0.0;  ///< standard deviation of an untouched element, in the pressure unit
   ContactClassifier classifier;
-  double gamma = 0.1;                 ///< of Eq. 7
+  double gamma = usual_gamma;         ///< of Eq. 7
   double prior = 0.2;                 ///< of new maps
   double spread_mm = 0.5;             ///< of new maps
   DisplacementSd touch_sd;            ///< of the touches' poses

@@ -8,6 +8,8 @@
 #include <system_error>
 #include <thread>
 
+#include <tbb/global_control.h>
+#include <tbb/info.h>
 #include <tbb/task_arena.h>
 
 #include "estimation/parallel_for.hpp"
@@ -211,17 +213,29 @@ void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::si
   if (!request.each_frame && !infers_region(request)) {
     return;
   }
+  std::vector<BatchEntry*> missing;
+  for (BatchEntry& entry : inputs) {
+    if (!entry.survey) {
+      missing.push_back(&entry);
+    }
+  }
+  if (missing.empty()) {
+    return;
+  }
+  threads = std::clamp<std::size_t>(threads, 1, missing.size());
   std::atomic<std::size_t> done = 0;
   const auto caller = std::this_thread::get_id();
-  tbb::task_arena arena(static_cast<int>(std::max<std::size_t>(threads, 1)));
+  // Readers wait for disks: there may be more of them than processors.
+  const tbb::global_control allowed(
+      tbb::global_control::max_allowed_parallelism,
+      std::max(threads, static_cast<std::size_t>(tbb::info::default_concurrency())));
+  tbb::task_arena arena(static_cast<int>(threads));
   arena.execute([&] {
-    parallel_for(inputs.size(), [&](std::size_t i) {
-      if (!inputs[i].survey) {
-        inputs[i].survey = survey_of(inputs[i], request);
-      }
+    parallel_for(missing.size(), [&](std::size_t i) {
+      missing[i]->survey = survey_of(*missing[i], request);
       ++done;
       if (std::this_thread::get_id() == caller) {
-        progress(static_cast<double>(done) / static_cast<double>(inputs.size()));
+        progress(static_cast<double>(done) / static_cast<double>(missing.size()));
       }
     });
   });
