@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <tuple>
 
 #include "estimation/hypotheses.hpp"
@@ -12,7 +13,7 @@ namespace palpate {
 
 namespace {
 
-/// Share of a belief that a block of bins, or an object, may hold unseen: shows in no result.
+/// Share of a belief that a block of bins, or an object, may hold unvisited: shows in no result.
 constexpr double negligible_share = 1e-12;
 
 /// Calls visit(grid bin, number of bins) for every run of bins that lie in one of the grid's.
@@ -114,12 +115,17 @@ Marginals BinBelief::marginals(int object, PoseLattice grid) const {
                  .theta = std::vector<double>(static_cast<std::size_t>(grid.theta_rad.count))};
   const Object& of = objects[object];
   const double log_scale = of.log_share + of.log_identity + log_objects;
-  const bool same_pivot = lattice.pivot_mm == grid.pivot_mm;
-  const GridIndices indices(lattice, grid);
+  if (std::exp(of.log_identity + log_objects) == 0.0) {
+    return sums;
+  }
+  std::optional<GridIndices> indices;
+  if (lattice.pivot_mm == grid.pivot_mm) {
+    indices.emplace(lattice, grid);
+  }
   visit(std::span(&object, 1), negligible_share,
         [&](const BinBox& box, std::span<const double> log_likelihood) {
-          if (same_pivot) {
-            indices.add(box, log_likelihood, of.reference, log_scale, sums);
+          if (indices) {
+            indices->add(box, log_likelihood, of.reference, log_scale, sums);
           } else {
             add_by_pose(box, log_likelihood, of.reference, log_scale, lattice, sums);
           }

@@ -65,6 +65,19 @@ TEST(BinBelief, HasTheMarginalsOfTheirDefinition) {
   }
 }
 
+TEST(BinBelief, VisitsNoBinOfAnObjectWhoseProbabilityIsZero) {
+  BinBelief belief{.lattice = bins,
+                   .objects = {{.log_identity = -746.0}, {.log_identity = -700.0}},
+                   .log_objects = -50.0,
+                   .visit = [](std::span<const int> /*asked*/, double /*least_share*/,
+                               const BinVisitor& /*visitor*/) { FAIL(); }};
+  for (const int object : {0, 1}) {
+    const Marginals none = belief.marginals(object, bins);
+    EXPECT_EQ(none.xy, std::vector<double>(static_cast<std::size_t>(bins.plane())));
+    EXPECT_EQ(none.theta, std::vector<double>(static_cast<std::size_t>(bins.theta_rad.count)));
+  }
+}
+
 TEST(BinBelief, DrawsTheBestBinWhereRoundingLeavesTheLastPartOut) {
   std::vector<double> logs(static_cast<std::size_t>(box.bins()), -100.0);
   logs[7] = 0.0;

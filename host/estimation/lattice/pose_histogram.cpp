@@ -69,11 +69,13 @@ struct PoseHistogram::Impl {
 
   /// Eq. 13: the log-belief of a bin is the sum of the touches' log-likelihoods there (Eq. 7).
   void update(std::span<const TouchEvidence> touches, const std::function<void(double)>& progress) {
+    if (!by_touch) {
+      gather(touches);  // where memory ends, the belief stays as it was
+    }
     change.change([&] {
       touched = touched || !touches.empty();
       summarised.reset();
       if (!by_touch) {
-        gather(touches);
         likelihood.accumulate(known, belief, progress);
         return;
       }
