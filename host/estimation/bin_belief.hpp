@@ -32,9 +32,8 @@ struct BinBelief {
   std::vector<Object> objects;
   /// Log of the probability of all objects together: below 0 beside "none of these".
   double log_objects = 0.0;
-  /// Visits the bins of these objects, each once. May leave out bins that together, in a block of a
-  /// few thousand, hold less than `least_share` of their object's belief.
-  std::function<void(std::span<const int>, double least_share, const BinVisitor&)> visit;
+  /// Visits the bins of these objects, each once, but for those that the choice leaves out.
+  std::function<void(std::span<const int>, const BlockChoice&, const BinVisitor&)> visit;
 
   /// Probabilities of an object's poses on a grid; a bin counts in the grid's nearest bin
   /// (PoseLattice::bin_of()). Those of all objects and "none of these" together sum to 1.

@@ -125,11 +125,11 @@ struct PoseHistogram::Impl {
   BinBelief bins() {
     BinBelief all{.lattice = options.lattice,
                   .objects = {},
-                  .visit = [this](std::span<const int> objects, double least_share,
+                  .visit = [this](std::span<const int> objects, const BlockChoice& choice,
                                   const BinVisitor& visitor) {
                     for (const int object : objects) {
-                      belief.visit(static_cast<std::size_t>(object), summaries()[object],
-                                   least_share, visitor);
+                      belief.visit(static_cast<std::size_t>(object), summaries()[object], choice,
+                                   visitor);
                     }
                   }};
     const std::vector<double> identity = normalised(log_evidence());
