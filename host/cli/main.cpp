@@ -1,3 +1,6 @@
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -21,13 +24,23 @@
 
 #include "cli/commands.hpp"
 #include "cli/supervisor.hpp"
-#include "model/descriptor.hpp"
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate::cli {
 
 namespace {
+
+/// Opens /dev/null in place of closed standard streams. Otherwise the first files opened would take
+/// their numbers, and what is printed would go into them. To be called before anything else.
+void open_closed_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    // open() takes the lowest free number, which is this stream's.
+    if (::fcntl(stream, F_GETFD) == -1 && ::open("/dev/null", O_RDWR) < 0) {
+      return;
+    }
+  }
+}
 
 /// Has pictures drawn with the fonts that lie beside the program, in ../share/palpate/fonts, as in
 /// a Python wheel: the machine may have neither fonts nor a configuration of fontconfig. Without
@@ -254,6 +267,6 @@ int run_supervised(int argc, char** argv) {
 }  // namespace palpate::cli
 
 int main(int argc, char** argv) {
-  palpate::open_closed_streams();
+  palpate::cli::open_closed_streams();
   return palpate::cli::run_supervised(argc, argv);
 }

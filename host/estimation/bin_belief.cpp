@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <tuple>
 
 #include "estimation/hypotheses.hpp"
@@ -12,8 +13,10 @@ namespace palpate {
 
 namespace {
 
-/// Share of a belief that a block of bins, or an object, may hold unseen: shows in no result.
+/// Share of a belief that a block of bins, or an object, may hold unvisited: shows in no result.
 constexpr double negligible_share = 1e-12;
+
+constexpr double rounding = 1e-5;  ///< of a block's sum in float32
 
 /// Calls visit(grid bin, number of bins) for every run of bins that lie in one of the grid's.
 template <typename Visit>
@@ -114,12 +117,17 @@ Marginals BinBelief::marginals(int object, PoseLattice grid) const {
                  .theta = std::vector<double>(static_cast<std::size_t>(grid.theta_rad.count))};
   const Object& of = objects[object];
   const double log_scale = of.log_share + of.log_identity + log_objects;
-  const bool same_pivot = lattice.pivot_mm == grid.pivot_mm;
-  const GridIndices indices(lattice, grid);
-  visit(std::span(&object, 1), negligible_share,
+  if (std::exp(of.log_identity + log_objects) == 0.0) {
+    return sums;
+  }
+  std::optional<GridIndices> indices;
+  if (lattice.pivot_mm == grid.pivot_mm) {
+    indices.emplace(lattice, grid);
+  }
+  visit(std::span(&object, 1), {negligible_share},
         [&](const BinBox& box, std::span<const double> log_likelihood) {
-          if (same_pivot) {
-            indices.add(box, log_likelihood, of.reference, log_scale, sums);
+          if (indices) {
+            indices->add(box, log_likelihood, of.reference, log_scale, sums);
           } else {
             add_by_pose(box, log_likelihood, of.reference, log_scale, lattice, sums);
           }
@@ -132,10 +140,9 @@ std::vector<std::vector<BinShare>> BinBelief::likely_bins(std::span<const int> a
   for (const int object : asked) {
     require_object(object, objects.size());
   }
-  constexpr double rounding = 1e-5;  // of a block's sum in float32
   const double least = std::log(least_share);
   std::vector<std::vector<BinShare>> likely(objects.size());
-  visit(asked, (1.0 - rounding) * least_share,
+  visit(asked, {(1.0 - rounding) * least_share},
         [&](const BinBox& box, std::span<const double> log_likelihood) {
           const bool alike = log_likelihood.size() == 1;
           const Object& of = objects[box.object];
@@ -159,7 +166,7 @@ std::vector<std::vector<BinShare>> BinBelief::likely_bins(std::span<const int> a
 
 double BinBelief::entropy() const {
   double entropy = 0.0;
-  visit(likely_objects(), negligible_share,
+  visit(likely_objects(), {negligible_share},
         [&](const BinBox& box, std::span<const double> log_likelihood) {
           const double times = log_likelihood.size() == 1 ? static_cast<double>(box.bins()) : 1.0;
           for (const double l : log_likelihood) {
@@ -181,8 +188,14 @@ std::vector<PoseSample> BinBelief::sample(std::size_t count, std::uint64_t seed)
   std::vector<DrawnBin> draws;
   DrawnBin best;
   double largest = 0.0;
+  double asked = 0.0;  // part of the belief in the blocks that were asked for
+  const auto has_draw = [&](std::size_t object, double share) {
+    const auto first = std::ranges::lower_bound(parts, asked - rounding);
+    asked += share * std::exp(objects[object].log_identity);
+    return first != parts.end() && *first <= asked + rounding;
+  };
   double reached = 0.0;  // part of the belief that was visited
-  visit(likely_objects(), negligible_share,
+  visit(likely_objects(), {negligible_share, has_draw},
         [&](const BinBox& box, std::span<const double> log_likelihood) {
           const std::int64_t alike = log_likelihood.size() == 1 ? box.bins() : 1;
           const Object& of = objects[box.object];

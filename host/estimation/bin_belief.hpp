@@ -15,8 +15,8 @@ namespace palpate {
 /// A belief over objects and the bins of a lattice, and what can be asked of it: of a histogram as
 /// of the bins that a search by bounds evaluated.
 struct BinBelief {
-  /// An object's part of the belief. Log-likelihoods may be so large that float64 holds no sum of
-  /// their exponentials beside them: bins are relative to one log-likelihood of the object's.
+  /// An object's part of the belief. Log-likelihoods may be so large that adding the log of a sum
+  /// to them loses its digits. So a bin's log-likelihood is taken relative to `reference` first.
   struct Object {
     double reference = 0.0;     ///< a log-likelihood, in nats
     double log_share = 0.0;     ///< log of the share of the object's belief that such a bin holds
@@ -32,13 +32,12 @@ struct BinBelief {
   std::vector<Object> objects;
   /// Log of the probability of all objects together: below 0 beside "none of these".
   double log_objects = 0.0;
-  /// Visits the bins of these objects, each once. May leave out bins that together, in a block of a
-  /// few thousand, hold less than `least_share` of their object's belief.
-  std::function<void(std::span<const int>, double least_share, const BinVisitor&)> visit;
+  /// Visits the bins of these objects, each once, but for those that the choice leaves out.
+  std::function<void(std::span<const int>, const BlockChoice&, const BinVisitor&)> visit;
 
   /// Probabilities of an object's poses on a grid; a bin counts in the grid's nearest bin
-  /// (PoseLattice::bin_of()). Those of all objects and "none of these" together sum to 1. Takes the
-  /// time of the bins that are visited where the grid turns about another pivot, and else less.
+  /// (PoseLattice::bin_of()). Those of all objects and "none of these" together sum to 1.
+  /// Slower where the grid has another pivot: each bin's pose is then computed.
   /// @throws Error where there is no such object, or on a grid that is not sound
   Marginals marginals(int object, PoseLattice grid) const;
   /// The bins that hold at least this share of their object's belief, [asked].

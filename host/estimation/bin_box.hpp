@@ -48,6 +48,15 @@ inline BinBox whole_plane(const PoseLattice& lattice, int theta, int object = 0)
 /// single number stands for all bins of its box.
 using BinVisitor = std::function<void(const BinBox&, std::span<const double>)>;
 
+/// Which blocks of a belief, of a few thousand bins of one object each, a visit reads.
+struct BlockChoice {
+  /// Share of its object's belief below which a block may be left out.
+  double least_share = 0.0;
+  /// Whether to read a block of this object that holds this share of the object's belief: asked of
+  /// each block in the order of the visit. The mean likelihood stands for all bins of others.
+  std::function<bool(std::size_t object, double share)> reads = {};
+};
+
 /// The log-likelihoods of bins in nats, box after box, each [y, x]: read from a dense belief or
 /// evaluated on demand.
 using BoxLogLikelihood = std::function<std::vector<double>(std::span<const BinBox>)>;

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "model/bounding_box.hpp"
+#include "model/extremes.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate {

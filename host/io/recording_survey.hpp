@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "io/recording_file.hpp"
-#include "model/bounding_box.hpp"
 #include "model/element_spacing.hpp"
+#include "model/extremes.hpp"
 
 namespace palpate {
 

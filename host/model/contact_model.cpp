@@ -238,6 +238,12 @@ std::vector<Reading> classify(const Touch& touch, const ContactModel& model,
   return readings;
 }
 
+void refuse_reading(std::size_t levels, std::size_t sets, Reading reading, std::size_t object) {
+  refuse_table(
+      fmt::format("it has {} levels and {} sets of numbers, none for level {} of object {}", levels,
+                  sets, static_cast<int>(reading), object));
+}
+
 double ContactModel::log_likelihood(Reading reading, const MapSample& map,
                                     std::size_t object) const {
   if (reading == Reading::unknown) {
@@ -246,10 +252,7 @@ double ContactModel::log_likelihood(Reading reading, const MapSample& map,
   if (table) {
     const std::size_t sets = table->sets();
     if (static_cast<std::size_t>(reading) >= table->levels() || (sets > 1 && object >= sets)) {
-      refuse_table(
-          fmt::format("it has {} levels and {} sets of numbers, none for level {} of object "
-                      "{}",
-                      table->levels(), sets, static_cast<int>(reading), object));
+      refuse_reading(table->levels(), sets, reading, object);
     }
     return interpolate(*table, reading, map.log_odds, object);
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "palpate/contact_model.hpp"
@@ -10,6 +11,10 @@ namespace palpate {
 /// update.
 std::vector<Reading> classify(const Touch& touch, const ContactModel& model,
                               std::vector<Reading> reuse);
+
+/// @throws Error: a table of so many levels and sets of numbers has none for this reading or object
+[[noreturn]] void refuse_reading(std::size_t levels, std::size_t sets, Reading reading,
+                                 std::size_t object);
 
 /// A model without a table as one with Eq. 7 in a table, which is read several times faster: within
 /// 1e-4 nats of Eq. 7, unless gamma is so small that log odds beyond +-16 matter. A model with a

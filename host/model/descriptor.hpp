@@ -35,15 +35,4 @@ class Descriptor {
   int descriptor_ = -1;
 };
 
-/// Opens /dev/null in place of closed standard streams. Otherwise the first files opened would take
-/// their numbers, and what is printed would go into them. Call it first in main().
-inline void open_closed_streams() {
-  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    // open() takes the lowest free number, which is this stream's.
-    if (::fcntl(stream, F_GETFD) == -1 && ::open("/dev/null", O_RDWR) < 0) {
-      return;
-    }
-  }
-}
-
 }  // namespace palpate

@@ -7,7 +7,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "model/bounding_box.hpp"
+#include "model/extremes.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {

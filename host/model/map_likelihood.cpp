@@ -39,7 +39,9 @@ MapLikelihood::MapLikelihood(const OccupancyGrid& map, const ContactModel& conta
     last_node_ = static_cast<double>(nodes_ - 1);
     first_log_odds_ = table->first_log_odds;
     nodes_per_nat_ = last_node_ / (table->last_log_odds - table->first_log_odds);
-    const std::size_t set = table->sets() == 1 ? 0 : object;
+    sets_ = table->sets();
+    object_ = object;
+    const std::size_t set = sets_ == 1 ? 0 : object;
     const auto first =
         table->log_likelihood.begin() + static_cast<std::ptrdiff_t>(set * levels_ * nodes_);
     nats_.assign(first, first + static_cast<std::ptrdiff_t>(levels_ * nodes_));
@@ -51,6 +53,7 @@ double MapLikelihood::at(const TouchEvidence& touch, const Pose& T_object_sensor
   double sum = 0.0;
   for (std::size_t e = 0; e < touch.readings.size(); ++e) {
     if (touch.readings[e] != Reading::unknown) {
+      require(touch.readings[e]);
       sum += at(touch.readings[e], axes * touch.elements_mm[e]);
     }
   }

@@ -7,6 +7,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "model/contact_readings.hpp"
 #include "model/interpolated_map.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/contact_model.hpp"
@@ -31,7 +32,8 @@ class MapLikelihood {
   /// The map at a place, see InterpolatedMap.
   double log_odds(const glm::dvec2& p_object_mm) const { return map_.log_odds(p_object_mm); }
 
-  /// Of a reading where the map has these log odds. Not for Unknown where the model has a table.
+  /// Of a reading where the map has these log odds. Where the model has a table, only for readings
+  /// that require() lets pass.
   double of(Reading reading, double log_odds) const {
     if (nats_.empty()) {
       return eq7_.log_likelihood(reading, {log_odds});
@@ -41,14 +43,21 @@ class MapLikelihood {
     const double* nats = nats_.data() + static_cast<std::size_t>(reading) * nodes_ + node;
     return nats[0] + (place - static_cast<double>(node)) * (nats[1] - nats[0]);
   }
+  /// @throws Error where the model has a table without numbers for the reading, Unknown among them
+  void require(Reading reading) const {
+    if (!nats_.empty() && static_cast<std::size_t>(reading) >= levels_) {
+      refuse_reading(levels_, sets_, reading, object_);
+    }
+  }
   /// Of a reading at a place on the object.
   double at(Reading reading, const glm::dvec2& p_object_mm) const {
     return of(reading, log_odds(p_object_mm));
   }
   /// Sum over the touch's known elements.
   /// @param T_object_sensor in the place of the touch's own pose
+  /// @throws Error as require()
   double at(const TouchEvidence& touch, const Pose& T_object_sensor) const;
-  /// Sum over the touches.
+  /// Sum over the touches. @throws Error as require()
   double at(std::span<const TouchEvidence> touches, const Pose& T_object_robot) const;
   /// Of every reading but Unknown of every element, [element, level].
   /// @param elements_mm in the sensor frame
@@ -61,7 +70,9 @@ class MapLikelihood {
   ContactModel eq7_;  ///< without the table
   std::size_t levels_ = 2;
   // Of a table.
-  std::vector<double> nats_;  ///< [level, node]
+  std::size_t sets_ = 1;
+  std::size_t object_ = 0;
+  std::vector<double> nats_;  ///< [level, node] of the object
   std::size_t nodes_ = 0;
   double last_node_ = 0.0;
   double first_log_odds_ = 0.0;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <regex>
 #include <string>
 #include <string_view>
 
@@ -10,26 +9,42 @@ namespace palpate {
 
 namespace {
 
+constexpr std::string_view name_letters = "abcdefghijklmnopqrstuvwxyz-";
+
 /// An option as it stands between backticks: "x-mm=-5:5".
 struct NamedOption {
-  std::string name;
-  std::string separator;  ///< between name and value: "", " " or "="
-  std::string value;
+  std::string_view name;
+  std::string_view separator;  ///< between name and value: "", " " or "="
+  std::string_view value;
   bool heads;  ///< a colon follows: the message is about the option
 };
 
 /// The message with each option in the words of `say`; what stands between other backticks stays.
 std::string with_options(std::string_view message,
                          const std::function<std::string(const NamedOption&)>& say) {
-  static const std::regex option("`([a-z-]+)(?:([ =])([^`]*))?`");
+  // Not std::regex, whose stack grows with every character of a value.
   std::string text;
-  std::string rest(message);
-  for (std::smatch found; std::regex_search(rest, found, option); rest = found.suffix()) {
-    text += found.prefix().str();
-    text += say(
-        {found[1].str(), found[2].str(), found[3].str(), found.suffix().str().starts_with(':')});
+  while (!message.empty()) {
+    const std::size_t begin = std::min(message.find('`'), message.size());
+    text += message.substr(0, begin);
+    message.remove_prefix(begin);
+    const std::size_t end = message.find('`', 1);
+    if (end == message.npos) {
+      return text.append(message);
+    }
+    const std::string_view inside = message.substr(1, end - 1);
+    const std::size_t name = std::min(inside.find_first_not_of(name_letters), inside.size());
+    const std::string_view separator = inside.substr(name, 1);
+    if (name == 0 || !(separator.empty() || separator == " " || separator == "=")) {
+      text += '`';
+      message.remove_prefix(1);
+      continue;
+    }
+    message.remove_prefix(end + 1);
+    text += say({inside.substr(0, name), separator, inside.substr(name + separator.size()),
+                 message.starts_with(':')});
   }
-  return text + rest;
+  return text;
 }
 
 /// A value as Python writes it: 0.5, (25, 25, 16), 'auto'.
@@ -54,13 +69,13 @@ std::string python_value(std::string_view value) {
 
 std::string in_flags(std::string_view message) {
   return with_options(message, [](const NamedOption& option) {
-    return "--" + option.name + option.separator + option.value;
+    return std::string("--").append(option.name).append(option.separator).append(option.value);
   });
 }
 
 std::string in_keywords(std::string_view message) {
   return with_options(message, [](const NamedOption& option) {
-    std::string text = option.name;
+    std::string text(option.name);
     std::ranges::replace(text, '-', '_');
     return option.heads && option.value.empty() ? text : text + "=" + python_value(option.value);
   });

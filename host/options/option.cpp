@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <type_traits>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
@@ -49,7 +51,7 @@ concept Word = !words<Value>.empty();
 template <typename Value>
 concept Number = std::is_arithmetic_v<Value> && !std::is_same_v<Value, bool>;
 
-/// What joins the numbers of a value; none where it has one.
+/// The character between a value's numbers; none for a value of one number.
 template <typename Value>
 constexpr std::optional<char> separator = {};
 template <>
@@ -65,7 +67,7 @@ constexpr std::optional<char> separator<std::variant<Numbers, Other>> = separato
 template <typename Value>
 constexpr std::optional<char> separator<std::optional<Value>> = separator<Value>;
 
-/// What texts a value has.
+/// What a refusal says to give.
 template <typename Value>
 constexpr const char* wanted = "a text";
 template <Number Value>
@@ -89,13 +91,13 @@ constexpr const char* wanted<Resampling> = "multinomial or systematic";
 template <typename Value>
 constexpr const char* wanted<std::optional<Value>> = wanted<Value>;
 
-/// The `count` finite numbers between the separators, which are all of the text.
-template <typename Number, std::size_t count>
-std::optional<std::array<Number, count>> numbers_of(const std::string& text, char separator) {
-  const std::vector<std::string_view> parts = split_text(text, separator);
-  std::array<Number, count> numbers{};
+/// The `count` finite numbers that make up the text, with this character between them.
+template <typename Value, std::size_t count>
+std::optional<std::array<Value, count>> numbers_of(const std::string& text, char between) {
+  const std::vector<std::string_view> parts = split_text(text, between);
+  std::array<Value, count> numbers{};
   for (std::size_t i = 0; i < count; ++i) {
-    const auto number = parts.size() == count ? detail::all_of<Number>(parts[i]) : std::nullopt;
+    const auto number = parts.size() == count ? detail::all_of<Value>(parts[i]) : std::nullopt;
     if (!number || !std::isfinite(static_cast<double>(*number))) {
       return {};
     }

@@ -1,5 +1,5 @@
-// Marginals on a coarser grid, against their definition, bin by bin; and draws where rounding
-// leaves the last of them out.
+// Marginals on a coarser grid, against their definition, bin by bin; and draws: where rounding
+// leaves the last of them out, and which blocks they read.
 
 #include "estimation/bin_belief.hpp"
 
@@ -41,7 +41,7 @@ Marginals by_definition(const PoseLattice& grid, const std::vector<double>& logs
 BinBelief belief_of(const std::vector<double>& log_likelihood, double reference) {
   return {.lattice = bins,
           .objects = {{.reference = reference}},
-          .visit = [&](std::span<const int> /*asked*/, double /*least_share*/,
+          .visit = [&](std::span<const int> /*asked*/, const BlockChoice& /*choice*/,
                        const BinVisitor& visitor) { visitor(box, log_likelihood); }};
 }
 
@@ -65,6 +65,19 @@ TEST(BinBelief, HasTheMarginalsOfTheirDefinition) {
   }
 }
 
+TEST(BinBelief, VisitsNoBinOfAnObjectWhoseProbabilityIsZero) {
+  BinBelief belief{.lattice = bins,
+                   .objects = {{.log_identity = -746.0}, {.log_identity = -700.0}},
+                   .log_objects = -50.0,
+                   .visit = [](std::span<const int> /*asked*/, const BlockChoice& /*choice*/,
+                               const BinVisitor& /*visitor*/) { FAIL(); }};
+  for (const int object : {0, 1}) {
+    const Marginals none = belief.marginals(object, bins);
+    EXPECT_EQ(none.xy, std::vector<double>(static_cast<std::size_t>(bins.plane())));
+    EXPECT_EQ(none.theta, std::vector<double>(static_cast<std::size_t>(bins.theta_rad.count)));
+  }
+}
+
 TEST(BinBelief, DrawsTheBestBinWhereRoundingLeavesTheLastPartOut) {
   std::vector<double> logs(static_cast<std::size_t>(box.bins()), -100.0);
   logs[7] = 0.0;
@@ -72,6 +85,29 @@ TEST(BinBelief, DrawsTheBestBinWhereRoundingLeavesTheLastPartOut) {
   for (const PoseSample& sample : belief_of(logs, std::log(1.1)).sample(100, 5)) {
     EXPECT_EQ(bins.bin_of(sample.T_object_robot), box.bin(7, bins));
   }
+}
+
+TEST(BinBelief, ReadsOnlyBlocksWithADraw) {
+  const std::vector<double> alike{-std::log(box.bins())};
+  std::vector<bool> read;
+  const BinBelief belief{.lattice = bins,
+                         .objects = {{}},
+                         .visit = [&](std::span<const int> /*asked*/, const BlockChoice& choice,
+                                      const BinVisitor& visitor) {
+                           for (int y = 0; y < box.y_count; ++y) {  // a block is a row
+                             BinBox row = box;
+                             row.y_first += y;
+                             row.y_count = 1;
+                             read.push_back(choice.reads(0, 1.0 / box.y_count));
+                             visitor(row, alike);
+                           }
+                         }};
+  std::vector<bool> drawn(static_cast<std::size_t>(box.y_count));
+  for (const PoseSample& sample : belief.sample(3, 6)) {
+    const std::int64_t bin = bins.bin_of(sample.T_object_robot);
+    drawn[static_cast<std::size_t>(bin % bins.plane() / bins.x_mm.count - box.y_first)] = true;
+  }
+  EXPECT_EQ(read, drawn);
 }
 
 }  // namespace palpate::bin_belief_test

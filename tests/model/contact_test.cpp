@@ -266,6 +266,25 @@ TEST(MapLikelihood, OfAllReadingsIsTheContactModels) {
   }
 }
 
+TEST(MapLikelihood, RefusesReadingsThatItsTableDoesNotHave) {
+  LikelihoodTable table{.nodes = 17, .level_edges = {8.0}, .log_likelihood = {}};
+  table.log_likelihood.assign(2 * 3 * 17, -1.0);
+  const ContactModel model{.prior = 0.2, .table = table};
+  const OccupancyGrid map = random_map(9, 9, 1.0, 1.0, 4);
+  TouchEvidence touch;
+  touch.elements_mm.resize(2);
+  touch.readings = {contact_level(1), Reading::unknown};
+  const MapLikelihood likelihood(map, model, 1);
+  EXPECT_EQ(likelihood.at(touch, Pose{}), -1.0);
+  touch.readings[1] = contact_level(2);
+  const std::string message = input_error([&] { likelihood.at(touch, Pose{}); });
+  expect_named(message, {"3 levels", "2 sets", "none for level 3 of object 1"});
+  EXPECT_EQ(message, input_error([&] { model.log_likelihood(touch.readings[1], {}, 1); }));
+  EXPECT_EQ(MapLikelihood(map, {.prior = 0.2}).at(touch, Pose{}),
+            2.0 * MapLikelihood(map, {.prior = 0.2}).at(Reading::in_contact, {}))
+      << "Eq. 7 has one level";
+}
+
 /// Largest difference in nats of predictive() from the normalised log-likelihoods, over random
 /// poses.
 double largest_error(const ContactModel& contact) {

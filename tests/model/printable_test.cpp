@@ -1,4 +1,4 @@
-
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -48,6 +48,14 @@ TEST(OptionWords, OtherTextBetweenBackticksStays) {
     EXPECT_EQ(in_flags(text), text);
     EXPECT_EQ(in_keywords(text), text);
   }
+}
+
+TEST(OptionWords, MayBeVeryLong) {
+  const std::string megabyte(1 << 20, 'a');
+  EXPECT_EQ(in_flags("`sensor " + megabyte + "`: no such file"),
+            "--sensor " + megabyte + ": no such file");
+  EXPECT_EQ(in_keywords("`sensor " + megabyte + "`"), "sensor='" + megabyte + "'");
+  EXPECT_EQ(in_flags("`" + megabyte + "`"), "--" + megabyte);
 }
 
 }  // namespace palpate::printable_test

@@ -202,7 +202,7 @@ BinBelief BoundedBelief::bins() {
   const SearchResult& result = found();
   BinBelief all{.lattice = options_.lattice,
                 .objects = {},
-                .visit = [this](std::span<const int> objects, double /*least_share*/,
+                .visit = [this](std::span<const int> objects, const BlockChoice& /*all*/,
                                 const BinVisitor& visitor) {
                   std::vector<std::uint8_t> asked(hypotheses_.size());
                   for (const int object : objects) {

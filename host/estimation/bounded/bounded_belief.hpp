@@ -73,7 +73,7 @@ class BoundedBelief {
   /// Whether the options ask for "none of these".
   bool has_none() const { return none_.has_value(); }
   /// Bounds of the log evidence of "none of these" with its prior weight, as SearchResult::mass
-  /// has that of the hypotheses: within 0.05 nats, or known to lie so far from the evidence of the
+  /// has that of the hypotheses: within 0.3 nats, or known to lie so far from the evidence of the
   /// hypotheses that the tolerance leaves one of them out, or as far as the budget reaches; within
   /// evidence_nats or beyond evidence_range_nats where the options ask for these. -infinity where
   /// it is left out. To be asked for after found().
@@ -102,7 +102,7 @@ class BoundedBelief {
 
   /// Searches to the tolerance, or as far as the options' budget reaches.
   Found find(double tolerance);
-  /// Ends the deadline where there is no room for more bins.
+  /// With a budget, ends the search once there is no room to keep more bins.
   Found find(const SearchGoal& goal, Deadline& deadline);
   /// @param refined where not null, takes the tiles that are divided
   SearchResult search(const SearchGoal& goal, const Deadline& deadline, const BinVisitor& visitor,

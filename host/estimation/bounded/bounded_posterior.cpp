@@ -279,6 +279,7 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
                                  static_cast<std::size_t>(object));
   double sum = 0.0;
   for (const ReadingRun& run : elements.runs) {
+    likelihood.require(run.reading);
     for (std::size_t e = run.begin; e < run.end; ++e) {
       const glm::dvec2 p_mm =
           T_object_robot * (elements.from_pivot_mm[e] + belief.options().lattice.pivot_mm);

@@ -35,27 +35,30 @@ std::size_t partials_of(const SlabExtent& slab, const ReductionSizes& sizes) {
   return std::size_t{slab.object_count} * groups_of(slab.bins(), sizes.bins());
 }
 
-/// Visits neighbouring bins of a slab as boxes: whole rows of a plane, or a part of a row.
-/// @param first of the bins, in the object's part of the slab
-void visit_boxes(const Slab& slab, std::size_t object, std::int64_t first,
+/// Visits a block's bins as boxes: whole rows of a plane, or a part of a row.
+/// @param log_likelihood of each bin, or one number that stands for all
+void visit_boxes(const Slab& slab, std::size_t object, const BeliefBlock& block,
                  std::span<const double> log_likelihood, const BinVisitor& visitor) {
-  while (!log_likelihood.empty()) {
+  const bool alike = log_likelihood.size() == 1;
+  const std::int64_t end = block.first + block.bins;
+  for (std::int64_t first = block.first; first < end;) {
+    const auto left = static_cast<std::size_t>(end - first);
     const auto in_plane = static_cast<std::uint32_t>(first % slab.plane());
     const std::uint32_t row = in_plane / slab.nx;
     const std::uint32_t x = in_plane % slab.nx;
-    const std::size_t rows = log_likelihood.size() / slab.nx;
+    const std::size_t rows = left / slab.nx;
     const bool whole_rows = x == 0 && rows > 0;
-    const BinBox box{
-        .object = static_cast<std::int32_t>(object),
-        .theta = static_cast<std::int32_t>(slab.theta_first + first / slab.plane()),
-        .y_first = static_cast<std::int32_t>(slab.row_first + row),
-        .y_count = static_cast<std::int32_t>(
-            whole_rows ? std::min<std::size_t>(rows, slab.row_count - row) : 1),
-        .x_first = static_cast<std::int32_t>(x),
-        .x_count = static_cast<std::int32_t>(
-            whole_rows ? slab.nx : std::min<std::size_t>(slab.nx - x, log_likelihood.size()))};
-    visitor(box, log_likelihood.first(static_cast<std::size_t>(box.bins())));
-    log_likelihood = log_likelihood.subspan(static_cast<std::size_t>(box.bins()));
+    const BinBox box{.object = static_cast<std::int32_t>(object),
+                     .theta = static_cast<std::int32_t>(slab.theta_first + first / slab.plane()),
+                     .y_first = static_cast<std::int32_t>(slab.row_first + row),
+                     .y_count = static_cast<std::int32_t>(
+                         whole_rows ? std::min<std::size_t>(rows, slab.row_count - row) : 1),
+                     .x_first = static_cast<std::int32_t>(x),
+                     .x_count = static_cast<std::int32_t>(
+                         whole_rows ? slab.nx : std::min<std::size_t>(slab.nx - x, left))};
+    visitor(box, alike ? log_likelihood
+                       : log_likelihood.subspan(static_cast<std::size_t>(first - block.first),
+                                                static_cast<std::size_t>(box.bins())));
     first += box.bins();
   }
 }
@@ -160,28 +163,35 @@ std::vector<BeliefSummary> DenseBelief::summarise(std::vector<BeliefSummary> reu
   return summaries;
 }
 
-void DenseBelief::visit(std::size_t object, const BeliefSummary& summary, double least_share,
+void DenseBelief::visit(std::size_t object, const BeliefSummary& summary, const BlockChoice& choice,
                         const BinVisitor& visitor) const {
-  constexpr std::size_t most_bins = std::size_t{1} << 20;  // read at once
-  std::vector<std::pair<const BeliefBlock*, std::vector<TwoFloat>>> read;
+  constexpr std::size_t most_bins = std::size_t{1} << 20;                  // read at once
+  std::vector<std::pair<const BeliefBlock*, std::vector<TwoFloat>>> read;  // no bins: not read
   std::vector<double> log_likelihood;
   const auto visit_read = [&] {
     stream_.run();
     for (const auto& [block, bins] : read) {
       log_likelihood.clear();
       std::ranges::transform(bins, std::back_inserter(log_likelihood), &TwoFloat::value);
-      visit_boxes(slabs_[block->slab], object, block->first, log_likelihood, visitor);
+      if (bins.empty()) {
+        const double mean = block->sum / static_cast<double>(block->bins);
+        log_likelihood.push_back(summary.max.value() + std::log(mean));
+      }
+      visit_boxes(slabs_[block->slab], object, *block, log_likelihood, visitor);
     }
     read.clear();
   };
   for (const BeliefBlock& block : summary.blocks) {
-    if (block.sum < least_share * summary.sum) {
+    if (block.sum < choice.least_share * summary.sum) {
       continue;
     }
-    const Slab& slab = slabs_[block.slab];
-    read.emplace_back(&block, std::vector<TwoFloat>(block.bins));
-    stream_.download(slab.log_likelihood, read.back().second,
-                     (slab.first_bin(object) + block.first) * sizeof(TwoFloat));
+    read.emplace_back(&block, std::vector<TwoFloat>());
+    if (!choice.reads || choice.reads(object, block.sum / summary.sum)) {
+      const Slab& slab = slabs_[block.slab];
+      read.back().second.resize(static_cast<std::size_t>(block.bins));
+      stream_.download(slab.log_likelihood, read.back().second,
+                       (slab.first_bin(object) + block.first) * sizeof(TwoFloat));
+    }
     if (read.size() * reduction_.bins() >= most_bins) {
       visit_read();
     }

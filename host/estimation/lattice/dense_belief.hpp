@@ -48,9 +48,9 @@ class DenseBelief {
   // These run the stream.
   /// @param reuse memory for the result
   std::vector<BeliefSummary> summarise(std::vector<BeliefSummary> reuse = {}) const;
-  /// Visits the bins of one object in the lattice's order, but for blocks that hold less than this
-  /// share of the object's belief: these are not read.
-  void visit(std::size_t object, const BeliefSummary& summary, double least_share,
+  /// Visits the bins of one object in the lattice's order, but for blocks of less than the choice's
+  /// least share.
+  void visit(std::size_t object, const BeliefSummary& summary, const BlockChoice& choice,
              const BinVisitor& visitor) const;
   /// The log-likelihoods of boxes of bins, one after another, each [y, x].
   std::vector<double> download(std::span<const BinBox> boxes) const;

@@ -21,6 +21,9 @@ class PredictedReadings {
  public:
   /// @param contact resolved for these hypotheses: with a prior
   PredictedReadings(std::span<const Hypothesis> hypotheses, const ContactModel& contact);
+  // Likelihoods refer to the maps beside them.
+  PredictedReadings(const PredictedReadings&) = delete;
+  PredictedReadings& operator=(const PredictedReadings&) = delete;
 
   const MapLikelihood& of(std::size_t object) const { return on_map_[object]; }
   std::size_t levels() const { return on_map_.front().levels(); }

@@ -69,11 +69,13 @@ struct PoseHistogram::Impl {
 
   /// Eq. 13: the log-belief of a bin is the sum of the touches' log-likelihoods there (Eq. 7).
   void update(std::span<const TouchEvidence> touches, const std::function<void(double)>& progress) {
+    if (!by_touch) {
+      gather(touches);  // where memory ends, the belief stays as it was
+    }
     change.change([&] {
       touched = touched || !touches.empty();
       summarised.reset();
       if (!by_touch) {
-        gather(touches);
         likelihood.accumulate(known, belief, progress);
         return;
       }
@@ -123,11 +125,11 @@ struct PoseHistogram::Impl {
   BinBelief bins() {
     BinBelief all{.lattice = options.lattice,
                   .objects = {},
-                  .visit = [this](std::span<const int> objects, double least_share,
+                  .visit = [this](std::span<const int> objects, const BlockChoice& choice,
                                   const BinVisitor& visitor) {
                     for (const int object : objects) {
-                      belief.visit(static_cast<std::size_t>(object), summaries()[object],
-                                   least_share, visitor);
+                      belief.visit(static_cast<std::size_t>(object), summaries()[object], choice,
+                                   visitor);
                     }
                   }};
     const std::vector<double> identity = normalised(log_evidence());

@@ -25,7 +25,7 @@ class ParticleLikelihood {
                      std::span<const Hypothesis> hypotheses, const PoseLattice& region,
                      const ContactModel& model);
 
-  /// Most elements that one segment of the evidence may hold.
+  /// Most elements that one run may hold.
   static std::size_t longest_run();
 
   /// Records the weighing of `count` particles, shaders::Particle about the region's centre, by one

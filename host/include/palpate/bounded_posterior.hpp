@@ -44,13 +44,13 @@ struct BoundedOptions {
   /// element, as a temperature does that suits several touches. From 0.
   double evidence_growth = 0.0;
   /// Bins to evaluate before a search ends with what it has proven, where no bin of these explains
-  /// the touches: where the best costs more than three quarters of the nats that they cost in
-  /// space off the map. By default such a search goes on, too. Where nothing fits, many bins fit
+  /// the touches: where the best costs more than three quarters of the nats that the touches cost
+  /// off the map. By default such a search goes on, too. Where nothing fits, many bins fit
   /// about as badly.
   std::optional<std::int64_t> poor_bins = {};
   /// Prior weight W of "none of these", as HistogramOptions::none_weight. Each touch's mean
   /// likelihood is bounded by searches of its own, until the log odds of "none of these" against
-  /// the objects are known within 0.05 nats, or it or the objects are known to have less than the
+  /// the objects are known within 0.3 nats, or it or the objects are known to have less than the
   /// tolerance or 1e-4, whichever is larger. With evidence_nats, it is known as closely as the
   /// labels are; where evidence_range_nats is infinite, never less closely than without.
   /// Certificate::none_log_evidence holds its bounds; Certificate::dropped_mass is of the objects'

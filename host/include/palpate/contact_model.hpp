@@ -48,7 +48,8 @@ struct PALPATE_API ContactModel {
   ContactClassifier classifier = {};
   double gamma = usual_gamma;  ///< of Eq. 7: how often the classifier answers at random, in [0, 1)
   /// m: of Eq. 7, and of the space beyond the maps. By default the maps' own, which must then be
-  /// the same for all: unequal priors would favour the emptier or the fuller map off their cells.
+  /// the same for all: unequal priors would favour one map over another where an element lies
+  /// beyond both.
   std::optional<double> prior = {};
   std::optional<LikelihoodTable> table = {};  ///< in the place of Eq. 7
 

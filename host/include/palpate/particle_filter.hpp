@@ -65,8 +65,9 @@ class PALPATE_API ParticleFilter {
 
   /// Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).
   /// @param progress called with the fraction done after each touch
-  /// @throws Error on a touch that is not sound, and changes nothing; Error if the device fails:
-  /// the particles may then be updated in part, and every call but reset() throws
+  /// @throws Error on a touch that is not sound, and changes nothing; Error if the device fails;
+  /// what `progress` throws. After that, or where memory ends, the particles may be updated in
+  /// part, and every call but reset() throws
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }
   /// Touches that are classified by the options' contact model already.

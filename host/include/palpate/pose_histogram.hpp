@@ -64,8 +64,9 @@ class PALPATE_API PoseHistogram {
 
   /// Multiplies the belief by the likelihood of these touches (Eq. 7, 13). Calls `progress` with
   /// the fraction done from time to time. Takes in no touch at all if one of them is not sound. If
-  /// the device fails or `progress` throws, the belief is left half-way: every call but reset()
-  /// then throws Error until reset() is called. Allocates seldom: see docs/embedding.md.
+  /// the device fails, memory ends or `progress` throws, the belief may be left half-way: every
+  /// call but reset() then throws Error until reset() is called. Allocates seldom: see
+  /// docs/embedding.md.
   /// @throws Error on a touch that is not sound, or if the device fails; what `progress` throws
   void update(std::span<const Touch> touches, const std::function<void(double)>& progress = {});
   void update(const Touch& touch) { update(std::span(&touch, 1)); }

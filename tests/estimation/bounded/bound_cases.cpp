@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "support/touched_shape.hpp"
@@ -177,6 +178,29 @@ BoundedOptions uncertain_options() {
 
 Recording touches_of_l(std::size_t touches, std::uint64_t seed) {
   return touches_of(on_letter_l, {{1.3, -0.8}, 0.7}, touches, seed);
+}
+
+PoseLattice cell_by_cell(double cell_mm) {
+  constexpr double eighth = std::numbers::pi / 4;
+  return {.x_mm = {-8.5 * cell_mm, 8.5 * cell_mm, 17},
+          .y_mm = {-7.5 * cell_mm, 7.5 * cell_mm, 15},
+          .theta_rad = {-eighth, two_pi - eighth, 4}};
+}
+
+Recording touches_on_nodes(double cell_mm) {
+  Uniform random(862);
+  Recording recording;
+  for (int e = 0; e < 20; ++e) {
+    const double x = std::floor(random(-8.0, 8.0)) + e % 2 / 2.0;
+    recording.elements_mm.emplace_back(cell_mm * x, cell_mm * std::floor(random(-8.0, 8.0)));
+  }
+  for (int i = 0; i < 3; ++i) {
+    recording.T_robot_sensor.push_back({{cell_mm * i, -cell_mm * i}, i * std::numbers::pi / 2});
+    for (int e = 0; e < 20; ++e) {
+      recording.pressure.push_back((e + i) % 3 == 0 ? 10.0 : 0.0);
+    }
+  }
+  return recording;
 }
 
 double sum(std::span<const double> values) {

@@ -91,6 +91,12 @@ BoundedOptions uncertain_options();
 /// Touches of the L, at one pose.
 Recording touches_of_l(std::size_t touches, std::uint64_t seed);
 
+/// Centres at whole cells, and quarter turns.
+PoseLattice cell_by_cell(double cell_mm);
+/// Touches whose elements lie exactly on the nodes of such cells, or on the borders between them,
+/// at every bin of cell_by_cell().
+Recording touches_on_nodes(double cell_mm);
+
 double sum(std::span<const double> values);
 
 /// The options of a histogram over the same bins, displacements and "none of these".

@@ -72,6 +72,13 @@ std::vector<Regime> regimes() {
     all.back().objects[0].weight = 1e-9;
     all.back().options.evidence_nats = 0.01;
   }
+  for (const double cell_mm : {0.5, 1.0, 0.1}) {  // 0.1 mm is no binary fraction
+    all.push_back({fmt::format("OnNodes{}UmApart", std::lround(1000.0 * cell_mm)),
+                   {{random_map(41, 41, cell_mm, 12.0, 860), 1.0},
+                    {random_map(41, 41, cell_mm, 12.0, 861), 1.0}},
+                   {.lattice = cell_by_cell(cell_mm)},
+                   touches_on_nodes(cell_mm)});
+  }
   return all;
 }
 

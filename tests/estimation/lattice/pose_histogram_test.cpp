@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "beliefs.hpp"
+#include "estimation/pose_draws.hpp"
 
 namespace palpate::pose_histogram_test {
 
@@ -103,6 +104,42 @@ TEST_F(PoseHistogramTest, SlippingSaysNothingAboutTheObject) {
   }
   EXPECT_LT(largest_difference(slipping.estimate().identity, one.estimate().identity), 1e-5);
   EXPECT_GT(largest_difference(slipping.log_likelihood(0), one.log_likelihood(0)), 0.1);
+}
+
+TEST(PoseHistogram, DrawsLieWhereTheirPartsOfTheBeliefDo) {
+  Device device = Device::open();
+  PoseLattice lattice = small_lattice();  // of so many bins that most blocks have no draw
+  lattice.x_mm.count = lattice.y_mm.count = lattice.theta_rad.count = 60;
+  PoseHistogram histogram(device, three_objects(), {.lattice = lattice});
+  histogram.update(all_touches(random_recording(1, 36, 98)));
+  constexpr std::uint64_t seed = 99;
+  constexpr std::size_t count = 5;
+  Random random(seed, Stream::belief);
+  const std::vector<double> parts = one_in_each_part(count, random);
+  const std::vector<PoseSample> draws = histogram.sample(count, seed);
+  ASSERT_EQ(draws.size(), count);
+  std::size_t draw = 0;
+  double reached = 0.0;
+  const std::vector<double> identity = histogram.estimate().identity;
+  for (int object = 0; object < 3; ++object) {
+    const std::vector<double> logs = histogram.log_likelihood(object);
+    const double largest = std::ranges::max(logs);
+    double mass = 0.0;
+    for (const double log : logs) {
+      mass += std::exp(log - largest);
+    }
+    for (std::size_t bin = 0; bin < logs.size(); ++bin) {
+      const double after = reached + identity[object] * std::exp(logs[bin] - largest) / mass;
+      if (draw < count && draws[draw].object == object &&
+          lattice.bin_of(draws[draw].T_object_robot) == static_cast<std::int64_t>(bin)) {
+        EXPECT_GE(parts[draw], reached - 1e-5) << "float32 sums of blocks";
+        EXPECT_LE(parts[draw], after + 1e-5);
+        ++draw;
+      }
+      reached = after;
+    }
+  }
+  EXPECT_EQ(draw, count);
 }
 
 }  // namespace palpate::pose_histogram_test

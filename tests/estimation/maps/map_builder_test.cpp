@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -109,6 +110,25 @@ void expect_same_map(const OccupancyGrid& a, const OccupancyGrid& b, double tole
   ASSERT_EQ(a.ny, b.ny);
   for (std::size_t i = 0; i < a.log_odds.size(); ++i) {
     ASSERT_NEAR(a.log_odds[i], b.log_odds[i], tolerance) << "cell " << i;
+  }
+}
+
+TEST(MapBuilder, MovesWithTheRobotFrame) {
+  const Recording recording = random_recording(6, 36, 18);
+  const OccupancyGrid map = build(all_touches(recording));
+  // A quarter turn and a whole number of cells map cells to cells.
+  const Pose by{{250.0, -33.5}, std::numbers::pi / 2.0};
+  const OccupancyGrid turned = build(all_touches(moved(recording, by)));
+  ASSERT_EQ(std::tie(turned.nx, turned.ny), std::tie(map.ny, map.nx));
+  for (int j = 0; j < map.ny; ++j) {
+    for (int i = 0; i < map.nx; ++i) {
+      const int turned_i = map.ny - 1 - j;
+      const glm::dvec2 off_mm = turned.centre_mm(turned_i, i) - by * map.centre_mm(i, j);
+      ASSERT_LT(std::hypot(off_mm.x, off_mm.y), 1e-9) << "float64 rounding";
+      // Positions within a tile are float32: 1e-6 mm, where an increment changes by up to 10 nats
+      // per mm.
+      ASSERT_NEAR(turned.at(turned_i, i), map.at(i, j), 1e-4);
+    }
   }
 }
 

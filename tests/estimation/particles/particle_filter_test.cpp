@@ -11,6 +11,7 @@
 
 #include "beliefs.hpp"
 #include "palpate/pose_error.hpp"
+#include "palpate/pose_histogram.hpp"
 #include "support/synthetic.hpp"
 #include "support/touched_shape.hpp"
 
@@ -169,9 +170,58 @@ TEST(ParticleFilter, MemoryCountsWhatAnEstimateTakes) {
   EXPECT_GE(filter.device_bytes(), before + particles * 4 * sizeof(float));
 }
 
+std::vector<Hypothesis> letter_and_disc() {
+  return {{map_of(on_letter_l, "L"), 1.0}, {map_of(on_disc, "disc"), 1.0}};
+}
+
+TEST(ParticleFilter, AgreesWithTheHistogramWhereThereIsNoNoise) {
+  // After one touch and without motion, weighted uniform particles are an integral over the same
+  // belief that the histogram sums over fine bins.
+  const std::vector<Hypothesis> objects = letter_and_disc();
+  Recording recording = touches_of(on_letter_l, {{3.0, -2.0}, 1.0}, 5, 461);
+  // A quarter of the elements leaves the belief so broad that many particles count.
+  for (std::size_t k = 0; k < recording.elements(); ++k) {
+    recording.valid.push_back(k % 4 == 0 ? 1 : 0);
+  }
+  Device device = Device::open();
+  ParticleFilter filter(device, objects,
+                        {.particles = 100'000, .motion_mm = 0.0, .motion_rad = 0.0});
+  PoseHistogram histogram(
+      device, objects,
+      {.lattice = {
+           .x_mm = {-10.0, 10.0, 60}, .y_mm = {-10.0, 10.0, 60}, .theta_rad = {0.0, two_pi, 60}}});
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    filter.reset();
+    histogram.reset();
+    filter.update(recording.touch(i));
+    histogram.update(recording.touch(i));
+    // The variance of a share of the weights is at most that of a coin tossed as often as there are
+    // effective particles.
+    const double deviation = 0.5 / std::sqrt(filter.effective_sample_size());
+    EXPECT_NEAR(filter.estimate().identity[0], histogram.estimate().identity[0], 4.0 * deviation)
+        << "touch " << i;
+    EXPECT_LT(deviation, 0.02) << "or this compares nothing";
+  }
+}
+
+TEST(ParticleFilter, FindsTheObjectAndThePoseByEitherResampling) {
+  const std::vector<Hypothesis> objects = letter_and_disc();
+  const Pose truth{{-4.0, 2.5}, 4.0};
+  const Recording recording = touches_of(on_letter_l, truth, 8, 462);
+  Device device = Device::open();
+  for (const Resampling resampling : {Resampling::multinomial, Resampling::systematic}) {
+    ParticleFilter filter(device, objects, {.particles = 20'000, .resampling = resampling});
+    filter.update(all_touches(recording));
+    const Estimate estimate = filter.estimate();
+    EXPECT_GT(estimate.identity[0], 0.99);
+    EXPECT_EQ(estimate.mode.object, 0);
+    // The motion noise alone spreads particles over 1 mm and 0.1 rad, 0.6 mm at 6 mm.
+    EXPECT_LT(pose_error_mm(body_of(objects[0].map), 1, estimate.mode.T_object_robot, truth), 1.5);
+  }
+}
+
 TEST(ParticleFilter, RandomParticlesFindAnObjectThatWasTakenElsewhere) {
-  const std::vector<Hypothesis> objects{{map_of(on_letter_l, "L"), 1.0},
-                                        {map_of(on_disc, "disc"), 1.0}};
+  const std::vector<Hypothesis> objects = letter_and_disc();
   const Body body = body_of(objects[0].map);
   const Pose first{{-6.0, -6.0}, 0.5};
   const Pose second{{7.0, 5.0}, 3.6};

@@ -28,7 +28,7 @@ struct AxisRun {
   int count = 0;
   std::array<double, most_block_bins> offset{};
 
-  /// Takes as many bins from `begin` on as a block may span, `most` at most.
+  /// Takes as many bins from `begin` on as a block may span, at most `limit`.
   AxisRun(const Axis& axis_mm, int begin, int limit, double origin_mm, const PlacedMap& map) {
     const auto at = [&](int bin) {
       const double cells = (axis_mm.centre(bin) - origin_mm) / map.cell_mm + MapPatches::border;
@@ -122,9 +122,9 @@ BinLikelihood::BinLikelihood(std::span<const Hypothesis> hypotheses, const Conta
 
 void BinLikelihood::move_pivot(const glm::dvec2& pivot_mm) { lattice_.pivot_mm = pivot_mm; }
 
-void BinLikelihood::evaluate_undisplaced(std::span<const BinBox> boxes,
-                                         const KnownElements& elements,
-                                         double* log_likelihood) const {
+void BinLikelihood::evaluate_on_this_thread(std::span<const BinBox> boxes,
+                                            const KnownElements& elements,
+                                            double* log_likelihood) const {
   PlacedElements placed;
   BinList bins;
   std::vector<ElementPatches> scratch;
@@ -196,8 +196,8 @@ void BinLikelihood::evaluate_undisplaced(std::span<const BinBox> boxes,
   }
   parallel_for(first_part.size() - 1, [&](std::size_t task) {
     const std::size_t first = first_part[task];
-    evaluate_undisplaced(std::span(parts).subspan(first, first_part[task + 1] - first), elements,
-                         log_likelihood.data() + first_bin[first]);
+    evaluate_on_this_thread(std::span(parts).subspan(first, first_part[task + 1] - first), elements,
+                            log_likelihood.data() + first_bin[first]);
   });
 }
 
@@ -223,7 +223,7 @@ void BinLikelihood::evaluate_blocks(std::size_t object, std::span<const BlockRun
                      .x_count = std::min(side * run.count, lattice_.x_mm.count - side * run.x)});
   }
   std::vector<double> values(bins_in(parts));
-  evaluate_undisplaced(parts, touch, values.data());
+  evaluate_on_this_thread(parts, touch, values.data());
   auto value = values.begin();
   for (const BinBox& part : parts) {
     for (int y = part.y_first; y < part.y_first + part.y_count; ++y) {

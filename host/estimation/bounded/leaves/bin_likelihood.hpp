@@ -69,9 +69,9 @@ class BinLikelihood {
   std::uint64_t bytes() const;
 
  private:
-  /// Bins as if no touch were displaced, on the caller's thread.
-  void evaluate_undisplaced(std::span<const BinBox> boxes, const KnownElements& elements,
-                            double* log_likelihood) const;
+  /// evaluate_undisplaced() on the caller's thread.
+  void evaluate_on_this_thread(std::span<const BinBox> boxes, const KnownElements& elements,
+                               double* log_likelihood) const;
   /// Sets a touch's bins as if it were undisplaced, on the caller's thread.
   void evaluate_blocks(std::size_t object, std::span<const BlockRun> runs,
                        const KnownElements& touch, const PlaceRows<double>& rows) const;

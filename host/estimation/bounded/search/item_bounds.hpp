@@ -15,9 +15,9 @@
 
 namespace palpate {
 
-// A search asks four things of its evidence, item by item (KnownElements::items()): all exact
-// touches together are one item, each displaced touch is one. Likelihoods of items multiply, so
-// that what these return adds up:
+// A search asks four things of its evidence, item by item (KnownElements::items()): all
+// undisplaced touches together are one item, each displaced touch is one. Likelihoods of items
+// multiply, so that what these return adds up:
 //
 //   penalties_of()               lower bounds of the item's penalties over tiles of any level
 //   reaches_of()                 where its elements may lie, and so which tiles may see the map

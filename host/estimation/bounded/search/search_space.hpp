@@ -152,7 +152,7 @@ struct SearchTask {
   const BinLikelihood& likelihood;  ///< evaluates bins
   const KnownElements& elements;
   SearchGoal goal;
-  const Deadline& deadline;  ///< after which tiles are dropped unseen
+  const Deadline& deadline;  ///< after which tiles are dropped without being divided
   const BinVisitor& visit;
   std::vector<double> error = {};  ///< [hypothesis] BinLikelihood::error() of the elements
 };
