@@ -2,13 +2,11 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
-#include "driver/deframer.hpp"
 #include "driver/device.hpp"
 #include "driver/packet_format.hpp"
 
@@ -53,8 +51,5 @@ SerialProfile read_serial_profile(const std::string& name_or_path);
 
 /// Reads a profile from its text. @param path names it in messages
 SerialProfile parse_serial_profile(const std::string& yaml, const std::filesystem::path& path);
-
-/// Makes a deframer for the profile's stream, which takes the stream in pieces of any size.
-std::unique_ptr<Deframer> make_deframer(const SerialProfile& profile);
 
 }  // namespace palpate

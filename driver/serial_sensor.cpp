@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -20,9 +21,10 @@
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 
+#include "driver/deframer.hpp"
 #include "driver/device.hpp"
-#include "driver/frame_queue.hpp"
 #include "driver/open_sensor.hpp"
+#include "driver/queued_sensor.hpp"
 #include "driver/serial_profile.hpp"
 #include "model/descriptor.hpp"
 #include "model/stream_time.hpp"
@@ -234,7 +236,7 @@ class SerialSensor final : public QueuedSensor {
     if (!port_) {  // a board that was unplugged since is a new device to the kernel
       connect();
     }
-    deframer_ = make_deframer(profile_);
+    deframer_.emplace(profile_.packet);
     port_->write(profile_.start);
   }
 
@@ -272,7 +274,7 @@ class SerialSensor final : public QueuedSensor {
 
   // Between start() and stop(), only the sensor's thread reads the port and uses these.
   std::unique_ptr<SerialPort> port_;
-  std::unique_ptr<Deframer> deframer_;
+  std::optional<PacketDeframer> deframer_;
   std::vector<ParsedFrame> parsed_;
   Descriptor stopping_{new_event()};  // readable once stop() is called
 };

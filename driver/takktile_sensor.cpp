@@ -1,6 +1,4 @@
-#include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <memory>
@@ -13,8 +11,8 @@
 
 #include <fmt/format.h>
 
-#include "driver/frame_queue.hpp"
 #include "driver/open_sensor.hpp"
+#include "driver/queued_sensor.hpp"
 #include "driver/serial_profile.hpp"
 #include "driver/takktile_protocol.hpp"
 #include "driver/transfer_ring.hpp"
@@ -66,7 +64,7 @@ Setup read_setup(UsbHandle& handle) {
 class Link {
  public:
   /// The context and the counters must outlive the link. @throws Error
-  Link(const UsbContext& context, const ListedDevice& device, TransferRing::Counters& counters)
+  Link(const UsbContext& context, const ListedDevice& device, SensorCounters& counters)
       : context_(context),
         counters_(counters),
         handle_(context, device),
@@ -128,7 +126,7 @@ class Link {
 
  private:
   const UsbContext& context_;
-  TransferRing::Counters& counters_;
+  SensorCounters& counters_;
   UsbHandle handle_;
   VendorInterface stream_;
   Setup setup_;
@@ -142,17 +140,9 @@ class Link {
 
 namespace {
 
-using std::chrono::duration_cast;
-using std::chrono::microseconds;
-using std::chrono::milliseconds;
-using std::chrono::steady_clock;
-
-// Waits between two looks for a board that is gone: short at first, as udev needs a moment to grant
-// permission; longer later, as the board may never come back.
-constexpr milliseconds first_back_off{50};
-constexpr milliseconds longest_back_off{1000};
-// Longest wait for events: stop() interrupts it, but an interrupt may be missed.
-constexpr milliseconds event_patience{100};
+// Longest wait for events, and so between two looks for a board that is gone: stop() interrupts it,
+// but an interrupt may be missed.
+constexpr suseconds_t event_patience_us = 100'000;
 
 /// The board came back with other elements, so that the stream cannot continue.
 class OtherElements : public Error {
@@ -160,14 +150,9 @@ class OtherElements : public Error {
   using Error::Error;
 };
 
-void handle_events(const UsbContext& context, microseconds patience) {
-  timeval time{.tv_sec = patience.count() / 1'000'000, .tv_usec = patience.count() % 1'000'000};
-  libusb_handle_events_timeout_completed(context.get(), &time, nullptr);
-}
-
-int on_arrival(libusb_context*, libusb_device*, libusb_hotplug_event, void* arrived) noexcept {
-  static_cast<std::atomic<bool>*>(arrived)->store(true);
-  return 0;  // stay registered
+void handle_events(const UsbContext& context) {
+  timeval patience{.tv_sec = 0, .tv_usec = event_patience_us};
+  libusb_handle_events_timeout_completed(context.get(), &patience, nullptr);
 }
 
 std::vector<ListedDevice> boards() { return with_id(usb_devices(), {takktile::usb_id}); }
@@ -183,9 +168,8 @@ class TakktileSensor final : public QueuedSensor {
     const std::vector<ListedDevice> listed = boards();
     const ListedDevice device = choose_device(listed, takktile_kind, which);
     which_ = distinction(device, listed);
-    link_ = std::make_unique<takktile::Link>(context_, device, transfer_counters_);
+    link_ = std::make_unique<takktile::Link>(context_, device, tally_);
     description_ = link_->description();
-    watch_arrivals();
   }
 
   ~TakktileSensor() override { stop(); }
@@ -193,12 +177,10 @@ class TakktileSensor final : public QueuedSensor {
   void start() override {
     stop();
     forget();
-    transfer_counters_ = {};
     tally_ = {};
     begin();
     gone_ = false;
     stopping_ = false;
-    back_off_ = first_back_off;
     thread_ = std::thread([this] { run(); });
   }
 
@@ -213,16 +195,6 @@ class TakktileSensor final : public QueuedSensor {
   }
 
  private:
-  void watch_arrivals() {
-    // Without hotplug events, wait_for_return() finds the board by looking at intervals.
-    if (libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) != 0) {
-      libusb_hotplug_register_callback(context_.get(), LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED,
-                                       LIBUSB_HOTPLUG_NO_FLAGS, LIBUSB_HOTPLUG_MATCH_ANY,
-                                       LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY,
-                                       on_arrival, &arrived_, nullptr);
-    }
-  }
-
   void begin() {
     if (link_) {
       try {
@@ -244,11 +216,11 @@ class TakktileSensor final : public QueuedSensor {
         } else {
           wait_for_return();
         }
-        publish_counts();
+        publish(tally_);
       }
       if (link_) {
         deliver(link_->end());
-        publish_counts();
+        publish(tally_);
       }
     } catch (...) {
       link_.reset();
@@ -257,11 +229,9 @@ class TakktileSensor final : public QueuedSensor {
   }
 
   void stream() {
-    handle_events(context_, event_patience);
+    handle_events(context_);
     TransferRing& ring = link_->ring();
-    std::vector<TransferRing::Completion> completions = ring.completed();
-    deliver(completions);
-    ring.recycle(std::move(completions));
+    deliver(ring.completed());
     if (ring.lost()) {
       let_go();
     } else if (ring.halted()) {
@@ -279,14 +249,7 @@ class TakktileSensor final : public QueuedSensor {
   }
 
   void wait_for_return() {
-    const auto end = steady_clock::now() + back_off_;
-    for (auto now = steady_clock::now(); !stopping_ && !arrived_ && now < end;
-         now = steady_clock::now()) {
-      handle_events(context_,
-                    std::min<microseconds>(duration_cast<microseconds>(end - now), event_patience));
-    }
-    back_off_ =
-        arrived_.exchange(false) ? first_back_off : std::min(2 * back_off_, longest_back_off);
+    handle_events(context_);
     if (stopping_) {
       return;
     }
@@ -303,7 +266,7 @@ class TakktileSensor final : public QueuedSensor {
 
   void reconnect() {
     const ListedDevice device = choose_device(boards(), takktile_kind, which_);
-    auto link = std::make_unique<takktile::Link>(context_, device, transfer_counters_);
+    auto link = std::make_unique<takktile::Link>(context_, device, tally_);
     const std::size_t elements = link->description().elements_mm.size();
     if (link->description().elements_mm != description_.elements_mm) {
       throw OtherElements(
@@ -333,29 +296,17 @@ class TakktileSensor final : public QueuedSensor {
       lose(spoiled);
       for (ParsedFrame& frame : parsed_) {
         push(std::move(frame), completion.host_time_s);
-        back_off_ = first_back_off;
       }
     }
   }
 
-  void publish_counts() {
-    SensorCounters counters = tally_;
-    counters.timeouts = transfer_counters_.timeouts;
-    counters.stalls = transfer_counters_.stalls;
-    counters.overflows = transfer_counters_.overflows;
-    publish(counters);
-  }
-
   UsbContext context_;
   std::string which_;  // serial number or port, by which a board that comes back is known
-  std::atomic<bool> arrived_ = false;  // a device was plugged in
 
   // Between start() and stop(), only the sensor's thread uses these.
-  TransferRing::Counters transfer_counters_;
   SensorCounters tally_;
   std::unique_ptr<takktile::Link> link_;  // none while the board is gone
   std::vector<ParsedFrame> parsed_;
-  std::chrono::milliseconds back_off_ = {};
 
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> gone_ = false;

@@ -16,7 +16,7 @@ constexpr unsigned transfer_patience_ms = 1000;
 }  // namespace
 
 TransferRing::TransferRing(const UsbContext& context, UsbHandle& handle, std::uint8_t endpoint,
-                           std::size_t transfer_bytes, Counters& counters)
+                           std::size_t transfer_bytes, SensorCounters& counters)
     : context_(context.get()),
       handle_(handle),
       endpoint_(endpoint),
@@ -47,18 +47,6 @@ std::vector<TransferRing::Completion> TransferRing::completed() {
     missing_ = 0;
   }
   return std::exchange(completed_, {});
-}
-
-void TransferRing::recycle(std::vector<Completion>&& completions) {
-  for (Completion& completion : completions) {
-    if (spare_.size() < transfers) {
-      spare_.push_back(std::move(completion.bytes));
-    }
-  }
-  completions.clear();
-  if (completed_.empty()) {
-    completed_.swap(completions);  // for its memory
-  }
 }
 
 void TransferRing::recover() {
@@ -123,15 +111,11 @@ void TransferRing::take(Slot& slot) {
 
 void TransferRing::keep(Slot& slot, std::size_t length, bool ended) noexcept {
   try {
-    std::vector<std::uint8_t> fresh;
-    if (!spare_.empty()) {
-      fresh = std::move(spare_.back());
-      spare_.pop_back();
-    }
-    fresh.resize(transfer_bytes_);
-    slot.buffer.swap(fresh);
-    fresh.resize(length);
-    completed_.push_back({std::move(fresh), host_clock_s(), ended, missing_});
+    const auto begin = slot.buffer.begin();
+    completed_.push_back({.bytes = {begin, begin + static_cast<std::ptrdiff_t>(length)},
+                          .host_time_s = host_clock_s(),
+                          .ended = ended,
+                          .missing = missing_});
     missing_ = 0;
   } catch (const std::bad_alloc&) {
     ++missing_;  // the caller is libusb, C code: no exception may leave

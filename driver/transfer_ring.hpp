@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "driver/usb_device.hpp"
+#include "palpate/sensor.hpp"
 
 namespace palpate {
 
@@ -26,28 +27,20 @@ class TransferRing {
     std::uint64_t missing = 0;
   };
 
-  /// Counts of faults, over all rings of a board.
-  struct Counters {
-    std::uint64_t timeouts = 0;
-    std::uint64_t stalls = 0;
-    std::uint64_t overflows = 0;
-  };
-
   static constexpr std::size_t transfers = 16;
 
   /// @param transfer_bytes size of one transfer, a multiple of the endpoint's packet size
-  /// @param counters must outlive the ring
+  /// @param counters counts time-outs, stalls and overflows; must outlive the ring
   /// @throws Error if the device takes no transfers
   TransferRing(const UsbContext& context, UsbHandle& handle, std::uint8_t endpoint,
-               std::size_t transfer_bytes, Counters& counters);
+               std::size_t transfer_bytes, SensorCounters& counters);
   ~TransferRing();
   TransferRing(const TransferRing&) = delete;
   TransferRing& operator=(const TransferRing&) = delete;
 
   /// Takes the transfers that returned since the last call, in order. The last completion may hold
-  /// missing transfers alone. Pass the result to recycle(), so that callbacks reuse its memory.
+  /// missing transfers alone.
   std::vector<Completion> completed();
-  void recycle(std::vector<Completion>&& completions);
 
   /// Whether a stall halted the endpoint; recover() ends the halt.
   bool halted() const { return halted_; }
@@ -83,8 +76,7 @@ class TransferRing {
   std::vector<Slot> slots_;
   std::vector<Completion> completed_;
   std::uint64_t missing_ = 0;  // lost transfers since the last completion
-  std::vector<std::vector<std::uint8_t>> spare_;
-  Counters& counters_;
+  SensorCounters& counters_;
   std::size_t errors_in_a_row_ = 0;
   bool draining_ = false;
   bool halted_ = false;

@@ -94,7 +94,7 @@ TEST_F(Hotplug, AnotherBoardDoesNotTakeThePlace) {
   plugged.expect_frame(100);
   plugged.unplug_and_notice();
   FakeTakktile other(usb_, "2", {0b11111}, Layout::bits, 9);
-  // Long enough for the sensor to look several times; the arrival makes it look at once.
+  // Long enough for the sensor to look several times.
   EXPECT_FALSE(plugged.sensor->next(300ms));
   EXPECT_TRUE(plugged.sensor->gone());
   EXPECT_TRUE(other.usb().seen().requests.empty());
