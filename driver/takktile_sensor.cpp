@@ -15,7 +15,6 @@
 #include "driver/queued_sensor.hpp"
 #include "driver/serial_profile.hpp"
 #include "driver/takktile_protocol.hpp"
-#include "driver/transfer_ring.hpp"
 #include "driver/usb_device.hpp"
 #include "palpate/error.hpp"
 

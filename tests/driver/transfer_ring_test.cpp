@@ -1,5 +1,3 @@
-#include "driver/transfer_ring.hpp"
-
 #include <gtest/gtest.h>
 
 #include <future>

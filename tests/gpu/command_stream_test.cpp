@@ -226,19 +226,6 @@ TEST(Buffer, AsALargerTableThanTheDeviceReadsIsRefusedBeforeItTakesMemory) {
   }
 }
 
-TEST(Context, LimitsAreLoweredNeverRaised) {
-  Context context("");
-  const Limits own = context.limits();
-  Limits other = own;
-  other.table_texels = ~0U;
-  other.storage_range = 1024;
-  context.lower_limits(other);
-  EXPECT_EQ(context.limits().table_texels, own.table_texels);
-  EXPECT_EQ(context.limits().storage_range, 1024U);
-  context.lower_limits(own);
-  EXPECT_EQ(context.limits().storage_range, own.storage_range);
-}
-
 TEST_F(Transfers, BringBackWhatWasSent) {
   constexpr std::size_t block = 4 << 20;  // of staging memory
   for (const std::size_t size : {std::size_t{1}, std::size_t{2}, std::size_t{3}, std::size_t{63},
@@ -250,24 +237,6 @@ TEST_F(Transfers, BringBackWhatWasSent) {
     stream.download(buffer, std::span(received));
     stream.run();
     EXPECT_TRUE(sent == received) << size;
-  }
-}
-
-TEST_F(Transfers, ManyOfThemTakeSeveralStagingBlocks) {
-  constexpr std::size_t pieces = 41;
-  constexpr std::size_t piece = 300001;  // odd, and 41 of them fill three blocks
-  const std::vector<std::uint8_t> sent = pattern<std::uint8_t>(pieces * piece);
-  const Buffer buffer(context, sent.size(), Memory::device, "a test");
-  for (const int repetition : {0, 1}) {
-    std::vector<std::uint8_t> received(sent.size());
-    for (std::size_t i = 0; i < pieces; ++i) {
-      stream.upload(buffer, std::span(sent).subspan(i * piece, piece), i * piece);
-    }
-    for (std::size_t i = 0; i < pieces; ++i) {
-      stream.download(buffer, std::span(received).subspan(i * piece, piece), i * piece);
-    }
-    stream.run();
-    EXPECT_TRUE(sent == received) << "repetition " << repetition;
   }
 }
 

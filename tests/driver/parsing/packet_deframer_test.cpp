@@ -131,43 +131,6 @@ TEST(PacketDeframer, FindsTheFieldsBehindCountedParts) {
   EXPECT_NEAR(receiver.frames()[0].device_time_s.value(), 0.005, 1e-12);
 }
 
-TEST(PacketDeframer, FindsTheLargestPacketBehindGarbage) {
-  const SerialProfile profile = parse_serial_profile(
-      "name: largest\nelements: [{grid: [128, 128], pitch_mm: [1, 1]}]\n"
-      "packet: [{bytes: '00'}, {values: u8, stride: 3}, {checksum: sum16, init: 0x1234}]\n",
-      "largest.yaml");
-  Bytes packet(1 + 3 * 16384, 0);
-  for (std::size_t i = 1; i < packet.size(); ++i) {
-    packet[i] = static_cast<std::uint8_t>(i / 3);
-  }
-  const std::uint32_t sum = profile.packet.check->checksum.of(packet);
-  packet.push_back(static_cast<std::uint8_t>(sum));
-  packet.push_back(static_cast<std::uint8_t>(sum >> 8));
-  Receiver receiver(profile);
-  const Bytes noise(1000, 0);  // each byte of which begins like a packet
-  receiver.push(noise);
-  receiver.push_in_pieces(packet, [] { return 7; });  // as a board of short packets delivers it
-  ASSERT_EQ(receiver.frames().size(), 1u);
-  EXPECT_EQ(receiver.frames()[0].values.back(), packet[1 + 3 * 16383]);
-  EXPECT_EQ(receiver.garbage(), noise.size());
-}
-
-TEST(LargestParts, AreGoneThroughInBoundedWork) {
-  // Each byte begins a packet of 2570 bytes, whose last part is cut short.
-  Receiver receiver(parse_serial_profile(R"(
-name: parts
-elements: [[0, 0], [1, 0], [2, 0]]
-packet:
-  - bytes: "0a"
-  - {length: u16be, most: 4096}
-  - {parts: u8, tags: [{tag: 0x0a, values: 3}]}
-)",
-                                         "parts.yaml"));
-  receiver.push(Bytes(50'000, 0x0a));
-  EXPECT_TRUE(receiver.frames().empty());
-  EXPECT_GT(receiver.garbage(), 45'000u);
-}
-
 TEST(EndlessGarbage, NeedsNoMoreMemoryThanItsFirstBytes) {
   PacketDeframer deframer(read_serial_profile("wts").packet);
   std::vector<ParsedFrame> frames;
