@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "driver/packet_format.hpp"
+#include "palpate/sensor.hpp"
 
 namespace palpate {
 
@@ -13,12 +14,6 @@ namespace palpate {
 struct ParsedFrame {
   std::vector<double> values;  ///< [e] in the board's pressure unit; NaN for a non-finite reading
   std::optional<double> device_time_s = {};  ///< by the board's clock, if the board sends a time
-};
-
-/// What a deframer dropped.
-struct DeframerCounters {
-  std::uint64_t checksum_errors = 0;  ///< packets with a wrong checksum
-  std::uint64_t garbage_bytes = 0;    ///< bytes that belong to no packet
 };
 
 /// Finds packets of a declared format in a byte stream, which may begin anywhere, lose bytes and
@@ -51,7 +46,8 @@ class PacketDeframer {
   /// Takes the next bytes of the stream, in pieces of any size, and appends the frames that they
   /// complete. A non-finite reading becomes NaN.
   void push(Bytes bytes, std::vector<ParsedFrame>& frames);
-  const DeframerCounters& counters() const { return counters_; }
+  /// Counts packets with a wrong checksum, and bytes that belong to no packet.
+  const SensorCounters& counters() const { return counters_; }
 
  private:
   struct FoundPart {
@@ -79,7 +75,7 @@ class PacketDeframer {
   std::vector<std::uint8_t> buffer_;  // recent bytes of the stream
   std::size_t at_ = 0;                // index of the first byte not yet consumed
   bool in_step_ = true;
-  DeframerCounters counters_;
+  SensorCounters counters_;
   std::vector<double> values_;        // of the frame in progress
   std::optional<double> time_s_;      // of the frame in progress
   std::optional<double> last_ticks_;  // of a clock whose unit is not stated

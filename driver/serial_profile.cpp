@@ -127,7 +127,6 @@ std::vector<glm::dvec2> read_elements_mm(const Entry& entry) {
 
 SerialProfile read_root(const Entry& root) {
   SerialProfile profile;
-  profile.path = root.file;
   std::optional<Entry> packet;
   double gain = 1.0;
   double offset = 0.0;

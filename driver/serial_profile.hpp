@@ -23,9 +23,8 @@ struct SerialLine {
 
 /// What a profile says of a board behind a serial port.
 struct SerialProfile {
-  std::filesystem::path path;  ///< the profile's file
-  std::string name;            ///< for people, such as "Robotiq TSF-85"
-  std::vector<UsbId> usb;      ///< empty if unknown: the user must say which device it is
+  std::string name;        ///< for people, such as "Robotiq TSF-85"
+  std::vector<UsbId> usb;  ///< empty if unknown: the user must say which device it is
   SerialLine line;
   std::vector<std::uint8_t> start;      ///< bytes that make the board send frames; may be empty
   std::vector<std::uint8_t> stop;       ///< bytes that make the board stop; may be empty

@@ -256,16 +256,15 @@ class SerialSensor final : public QueuedSensor {
   void deliver(std::span<const std::uint8_t> bytes) {
     const double host_time_s = host_clock_s();
     parsed_.clear();
-    const std::uint64_t damaged_before = deframer_->counters().checksum_errors;
+    const std::uint64_t lost_before = deframer_->counters().checksum_errors;
     deframer_->push(bytes, parsed_);
-    const DeframerCounters& counted = deframer_->counters();
-    lose(counted.checksum_errors - damaged_before);
+    SensorCounters counters = deframer_->counters();
+    counters.lost = counters.checksum_errors;
+    lose(counters.lost - lost_before);
     for (ParsedFrame& frame : parsed_) {
       push(std::move(frame), host_time_s);
     }
-    publish({.lost = counted.checksum_errors,
-             .checksum_errors = counted.checksum_errors,
-             .garbage_bytes = counted.garbage_bytes});
+    publish(counters);
   }
 
   SerialProfile profile_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -72,25 +73,23 @@ Calibration parse_calibration(std::span<const std::uint8_t> reply);
 double pressure_kpa(const Calibration& calibration, std::uint16_t raw_pressure,
                     std::uint16_t raw_temperature);
 
-/// Decodes the bulk stream, one packet per push. A frame has 4 bytes per cell that is alive and
-/// ends with a packet of fewer than packet_bytes, perhaps an empty packet.
+/// Decodes the bulk stream. A frame has 4 bytes per cell that is alive and ends with a packet of
+/// fewer than packet_bytes, perhaps an empty packet.
 class Deframer {
  public:
   /// @param calibrations [cell] in the order of parse_alive_map()
-  explicit Deframer(std::vector<Calibration> calibrations);
+  /// @param garbage_bytes counts the bytes that belong to no frame; must outlive this object
+  Deframer(std::vector<Calibration> calibrations, std::uint64_t& garbage_bytes);
 
-  void push(std::span<const std::uint8_t> packet, std::vector<ParsedFrame>& frames);
+  /// Takes the next bytes. Where they end a frame and its length is right, returns it.
+  std::optional<ParsedFrame> push(std::span<const std::uint8_t> bytes, bool ended);
   void reset();
-  const DeframerCounters& counters() const { return counters_; }
-
-  /// Size of a frame in bytes.
-  std::size_t frame_bytes() const { return 4 * calibrations_.size(); }
 
  private:
   std::vector<Calibration> calibrations_;
+  std::uint64_t& garbage_bytes_;
   std::vector<std::uint8_t> frame_;  // the bytes of the frame in progress
   bool frame_fits_ = true;           // false: the frame is too long, and skipped up to its end
-  DeframerCounters counters_;
 };
 
 }  // namespace palpate::takktile

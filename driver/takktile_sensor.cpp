@@ -3,7 +3,6 @@
 #include <exception>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -69,7 +68,7 @@ class Link {
         handle_(context, device),
         stream_(handle_.vendor_interface()),
         setup_((handle_.claim(stream_.number), read_setup(handle_))),
-        deframer_(setup_.calibrations) {}
+        deframer_(setup_.calibrations, counters.garbage_bytes) {}
 
   const SensorDescription& description() const { return setup_.description; }
 
@@ -102,26 +101,6 @@ class Link {
   /// The ring of the running stream.
   TransferRing& ring() { return *ring_; }
   Deframer& deframer() { return deframer_; }
-
-  /// Passes the bytes of a transfer to the deframer and appends the frames that they complete.
-  /// @return the number of frames known to be spoiled
-  std::uint64_t parse(const TransferRing::Completion& completion,
-                      std::vector<ParsedFrame>& frames) {
-    const std::size_t before = frames.size();
-    // The deframer takes single packets. A transfer that ended early behind full packets alone
-    // ended with an empty packet.
-    std::span<const std::uint8_t> rest = completion.bytes;
-    while (rest.size() >= packet_bytes) {
-      deframer_.push(rest.first(packet_bytes), frames);
-      rest = rest.subspan(packet_bytes);
-    }
-    if (completion.ended || !rest.empty()) {
-      deframer_.push(rest, frames);
-    }
-    // A transfer that ended without a frame had too few cells or too many.
-    const bool spoiled = completion.ended && !completion.bytes.empty() && frames.size() == before;
-    return spoiled ? 1 : 0;
-  }
 
  private:
   const UsbContext& context_;
@@ -279,22 +258,22 @@ class TakktileSensor final : public QueuedSensor {
   }
 
   void deliver(const std::vector<TransferRing::Completion>& completions) {
-    takktile::Deframer& deframer = link_->deframer();
+    const auto lose_frames = [this](std::uint64_t frames) {
+      lose(frames);
+      tally_.lost += frames;
+    };
     for (const TransferRing::Completion& completion : completions) {
       if (completion.missing > 0) {
         // A lower bound: each missing transfer held at least part of a frame.
-        deframer.reset();
-        lose(completion.missing);
-        tally_.lost += completion.missing;
+        link_->deframer().reset();
+        lose_frames(completion.missing);
       }
-      const std::uint64_t garbage_before = deframer.counters().garbage_bytes;
-      parsed_.clear();
-      const std::uint64_t spoiled = link_->parse(completion, parsed_);
-      tally_.garbage_bytes += deframer.counters().garbage_bytes - garbage_before;
-      tally_.lost += spoiled;
-      lose(spoiled);
-      for (ParsedFrame& frame : parsed_) {
-        push(std::move(frame), completion.host_time_s);
+      // A transfer that was given up may end with a packet that is not full, too.
+      const bool ended = completion.ended || completion.bytes.size() % takktile::packet_bytes != 0;
+      if (auto frame = link_->deframer().push(completion.bytes, ended)) {
+        push(std::move(*frame), completion.host_time_s);
+      } else if (ended && !completion.bytes.empty()) {
+        lose_frames(1);  // it has too few cells or too many
       }
     }
   }
@@ -305,7 +284,6 @@ class TakktileSensor final : public QueuedSensor {
   // Between start() and stop(), only the sensor's thread uses these.
   SensorCounters tally_;
   std::unique_ptr<takktile::Link> link_;  // none while the board is gone
-  std::vector<ParsedFrame> parsed_;
 
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> gone_ = false;
