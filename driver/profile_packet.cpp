@@ -37,6 +37,14 @@ NumberType read_number_type(const Entry& entry) {
                                    {"f32be", {Kind::real, 4, true}}});
 }
 
+NumberType read_unsigned_type(const Entry& entry) {
+  const NumberType type = read_number_type(entry);
+  if (type.kind != NumberType::Kind::unsigned_integer) {
+    entry.refuse("give u8, u16le, u16be, u32le, u32be, u64le or u64be");
+  }
+  return type;
+}
+
 /// The place of the next field, which the format takes up.
 Format::Place next_place(Format& format, std::size_t bytes) {
   const Format::Place place{format.bytes, bytes};
@@ -106,13 +114,7 @@ void read_check(const Entry& field, Format& format) {
 
 void read_length(const Entry& field, Format& format) {
   Format::Length& length = format.length.emplace();
-  read_keys(field, {{"length",
-                     [&](const Entry& e) {
-                       length.type = read_number_type(e);
-                       if (length.type.kind != NumberType::Kind::unsigned_integer) {
-                         e.refuse("give u8, u16le, u16be, u32le, u32be, u64le or u64be");
-                       }
-                     }},
+  read_keys(field, {{"length", [&](const Entry& e) { length.type = read_unsigned_type(e); }},
                     {"extra", whole_number(length.extra, 0, most_packet_bytes)},
                     {"most", whole_number(length.most, 1, most_packet_bytes)}});
   length.place = next_place(format, length.type.bytes);
@@ -157,7 +159,7 @@ Format::Part read_part(const Entry& entry, const NumberType& type, std::size_t e
                     {"skip", whole_number(skip, 0, 4096)},
                     {"time",
                      [&](const Entry& e) {
-                       part.clock = {read_number_type(e), 0.0};
+                       part.clock = {read_unsigned_type(e), 0.0};
                      }},
                     {"tick_s", [&](const Entry& e) { tick_s = e.number(1e-9, 1.0); }}});
   if (!tag) {
@@ -168,9 +170,6 @@ Format::Part read_part(const Entry& entry, const NumberType& type, std::size_t e
     entry.refuse("a part has either 'values', 'time' or 'skip'; remove one");
   }
   if (part.clock) {
-    if (part.clock->type.kind != NumberType::Kind::unsigned_integer) {
-      entry.refuse("'time' is an unsigned integer, such as u64be; correct it");
-    }
     part.clock->tick_s = tick_s;
     skip = part.clock->type.bytes;
   }

@@ -12,12 +12,15 @@
 
 namespace palpate::takktile {
 
-// Vendor requests of the published firmware, TakkTile-usb: firmware/main.c, and TakkTile.py for the
-// calibration. All are IN requests to the device, also the request that starts and stops the
-// stream.
+// The interface and the bulk endpoint towards the host of the published firmware, TakkTile-usb:
+// firmware/Descriptors.c.
 inline constexpr UsbId usb_id{.vendor = 0x59e3, .product = 0x74c7};
+inline constexpr int usb_interface = 0;
+inline constexpr std::uint8_t usb_endpoint = 0x81;
 inline constexpr std::size_t packet_bytes = 64;
 
+// Its vendor requests: firmware/main.c, and TakkTile.py for the calibration. All are IN requests to
+// the device, also the request that starts and stops the stream.
 inline constexpr std::uint8_t request_alive_map = 0x5c;    ///< ask for alive_map_request_bytes
 inline constexpr std::uint8_t request_calibration = 0x6c;  ///< wValue column, wIndex row
 inline constexpr std::uint8_t request_stream = 0xc7;       ///< wValue ticks, wIndex 0: stop

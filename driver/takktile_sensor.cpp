@@ -66,8 +66,7 @@ class Link {
       : context_(context),
         counters_(counters),
         handle_(context, device),
-        stream_(handle_.vendor_interface()),
-        setup_((handle_.claim(stream_.number), read_setup(handle_))),
+        setup_((handle_.claim(usb_interface), read_setup(handle_))),
         deframer_(setup_.calibrations, counters.garbage_bytes) {}
 
   const SensorDescription& description() const { return setup_.description; }
@@ -76,7 +75,7 @@ class Link {
   void begin() {
     deframer_.reset();
     // The ring must be ready before the board sends.
-    ring_.emplace(context_, handle_, stream_.endpoint, transfer_packets * packet_bytes, counters_);
+    ring_.emplace(context_, handle_, usb_endpoint, transfer_packets * packet_bytes, counters_);
     try {
       handle_.control_in(request_stream, stream_reply_bytes, default_period_ticks, start_index);
     } catch (...) {
@@ -106,7 +105,6 @@ class Link {
   const UsbContext& context_;
   SensorCounters& counters_;
   UsbHandle handle_;
-  VendorInterface stream_;
   Setup setup_;
   Deframer deframer_;
   std::optional<TransferRing> ring_;

@@ -91,32 +91,6 @@ UsbHandle::~UsbHandle() {
   }
 }
 
-VendorInterface UsbHandle::vendor_interface() const {
-  libusb_config_descriptor* descriptor = nullptr;
-  checked(device_, "its configuration cannot be read",
-          libusb_get_active_config_descriptor(libusb_get_device(handle_.get()), &descriptor));
-  const std::unique_ptr<libusb_config_descriptor, void (*)(libusb_config_descriptor*)> owner(
-      descriptor, libusb_free_config_descriptor);
-  for (const libusb_interface& interface :
-       std::span(descriptor->interface, descriptor->bNumInterfaces)) {
-    // The first alternate setting is the active one.
-    for (const libusb_interface_descriptor& setting :
-         std::span(interface.altsetting, std::min(1, interface.num_altsetting))) {
-      for (const libusb_endpoint_descriptor& e :
-           std::span(setting.endpoint, setting.bNumEndpoints)) {
-        if (setting.bInterfaceClass == LIBUSB_CLASS_VENDOR_SPEC &&
-            (e.bmAttributes & LIBUSB_TRANSFER_TYPE_MASK) == LIBUSB_TRANSFER_TYPE_BULK &&
-            (e.bEndpointAddress & LIBUSB_ENDPOINT_IN) != 0) {
-          return {setting.bInterfaceNumber, e.bEndpointAddress};
-        }
-      }
-    }
-  }
-  throw Error(Fault::system,
-              fmt::format("{}: has no vendor's interface with a bulk endpoint; check its firmware",
-                          device_.place()));
-}
-
 void UsbHandle::claim(int interface) {
   checked(device_, fmt::format("interface {} cannot be claimed", interface),
           libusb_claim_interface(handle_.get(), interface));

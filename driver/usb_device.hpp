@@ -28,12 +28,6 @@ class UsbContext {
   std::unique_ptr<libusb_context, Exit> context_;
 };
 
-/// An interface with a bulk endpoint towards the host.
-struct VendorInterface {
-  int number = 0;
-  std::uint8_t endpoint = 0;
-};
-
 /// An opened device. Every call waits for the device, at most 1 s, and throws Error if it fails. A
 /// call may run callbacks of other transfers; do not make it from a callback.
 class UsbHandle {
@@ -42,9 +36,6 @@ class UsbHandle {
   ~UsbHandle();
   UsbHandle(const UsbHandle&) = delete;
   UsbHandle& operator=(const UsbHandle&) = delete;
-
-  /// Finds the first interface of the class of vendors that has a bulk endpoint towards the host.
-  VendorInterface vendor_interface() const;
 
   /// Claims the interface. A kernel driver that holds it is detached until the handle is destroyed.
   void claim(int interface);
