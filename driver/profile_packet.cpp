@@ -56,7 +56,7 @@ Format::Place next_place(Format& format, std::size_t bytes) {
 
 void read_check(const Entry& field, Format& format) {
   using Kind = Checksum::Kind;
-  Format::Check& check = format.check.emplace();
+  Format::Check& check = format.check.emplace(Format::Check{});
   Checksum& options = check.checksum;
   read_keys(field, {{"checksum",
                      [&](const Entry& e) {
@@ -113,7 +113,7 @@ void read_check(const Entry& field, Format& format) {
 }
 
 void read_length(const Entry& field, Format& format) {
-  Format::Length& length = format.length.emplace();
+  Format::Length& length = format.length.emplace(Format::Length{});
   read_keys(field, {{"length", [&](const Entry& e) { length.type = read_unsigned_type(e); }},
                     {"extra", whole_number(length.extra, 0, most_packet_bytes)},
                     {"most", whole_number(length.most, 1, most_packet_bytes)}});
@@ -134,7 +134,7 @@ void read_time(const Entry& field, Format& format) {
 }
 
 void read_values(const Entry& field, Format& format) {
-  Format::Values& values = format.values.emplace();
+  Format::Values& values = format.values.emplace(Format::Values{});
   read_keys(field, {{"values", [&](const Entry& e) { values.type = read_number_type(e); }},
                     {"stride", whole_number(values.stride_bytes, 1, 256)},
                     {"at", whole_number(values.at_byte, 0, 255)}});
@@ -178,7 +178,7 @@ Format::Part read_part(const Entry& entry, const NumberType& type, std::size_t e
 }
 
 void read_parts(const Entry& field, Format& format) {
-  Format::Parts& parts = format.parts.emplace();
+  Format::Parts& parts = format.parts.emplace(Format::Parts{});
   std::vector<Entry> tags;
   read_keys(
       field,

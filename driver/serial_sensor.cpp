@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -16,7 +17,6 @@
 #include <grp.h>
 #include <linux/serial.h>
 #include <poll.h>
-#include <sys/eventfd.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
@@ -122,17 +122,13 @@ class SerialPort {
     }
   }
 
-  /// Waits until bytes come or the device goes, or until `wake` is readable, which it returns.
-  bool wait(const Descriptor& wake) {
-    pollfd files[] = {{.fd = port_.get(), .events = POLLIN, .revents = 0},
-                      {.fd = wake.get(), .events = POLLIN, .revents = 0}};
-    poll(files, 2, -1);
-    return (files[1].revents & POLLIN) != 0;
-  }
-
-  /// Takes what came, up to the room in `buffer`: nothing where nothing came.
+  /// Takes the bytes that come, up to the room in `buffer`: none where none come in time.
   /// @throws Error where the device is gone
   std::span<const std::uint8_t> read(std::span<std::uint8_t> buffer) {
+    // How long stop() waits for a silent board.
+    constexpr int patience_ms = 50;
+    pollfd file{.fd = port_.get(), .events = POLLIN, .revents = 0};
+    poll(&file, 1, patience_ms);
     const ssize_t count = ::read(port_.get(), buffer.data(), buffer.size());
     if (count > 0) {
       return buffer.first(static_cast<std::size_t>(count));
@@ -151,14 +147,6 @@ class SerialPort {
   std::string node_;
   Descriptor port_;
 };
-
-int new_event() {
-  const int event = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  if (event < 0) {
-    throw Error(Fault::system, "serial port: too many open files; close some");
-  }
-  return event;
-}
 
 /// A sensor that streams from a board behind a serial port. Once the board is gone, next() throws
 /// until start() finds it again.
@@ -182,6 +170,7 @@ class SerialSensor final : public QueuedSensor {
     stop();
     forget();
     begin();
+    stopping_ = false;
     thread_ = std::thread([this] { run(); });
   }
 
@@ -189,10 +178,8 @@ class SerialSensor final : public QueuedSensor {
     if (!thread_.joinable()) {
       return;
     }
-    eventfd_write(stopping_.get(), 1);
+    stopping_ = true;
     thread_.join();
-    eventfd_t count = 0;
-    eventfd_read(stopping_.get(), &count);
     try {
       if (port_) {
         port_->write(profile_.stop);
@@ -243,10 +230,9 @@ class SerialSensor final : public QueuedSensor {
   void run() {
     try {
       std::vector<std::uint8_t> buffer(1 << 16);
-      for (bool stopping = false; !stopping;) {
-        stopping = port_->wait(stopping_);
+      do {
         deliver(port_->read(buffer));
-      }
+      } while (!stopping_);
     } catch (...) {
       port_.reset();  // a port that hung up would keep its name from the board that comes back
       fail();
@@ -275,7 +261,8 @@ class SerialSensor final : public QueuedSensor {
   std::unique_ptr<SerialPort> port_;
   std::optional<PacketDeframer> deframer_;
   std::vector<ParsedFrame> parsed_;
-  Descriptor stopping_{new_event()};  // readable once stop() is called
+
+  std::atomic<bool> stopping_ = false;
 };
 
 }  // namespace

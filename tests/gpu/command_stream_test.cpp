@@ -1,6 +1,7 @@
 #include "gpu/command_stream.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <functional>
 #include <string>
@@ -246,11 +247,15 @@ TEST_F(Transfers, ReadTheValuesAtOnceAndOnlyThose) {
   std::vector<std::uint8_t> values{1, 2, 3};
   stream.upload(buffer, std::span<const std::uint8_t>(values), 2);
   std::fill(values.begin(), values.end(), std::uint8_t{99});
+  stream.upload(buffer, std::array<std::uint8_t, 1>{7}, 6);
+  std::vector<std::uint8_t> some(3);
   std::vector<std::uint8_t> all(8);
+  stream.download(buffer, std::span(some), 3);
   stream.download(buffer, std::span(all));
   stream.upload(buffer, std::span<const std::uint8_t>{});
   stream.run();
-  EXPECT_EQ(all, (std::vector<std::uint8_t>{0x11, 0x11, 1, 2, 3, 0x11, 0x11, 0x11}));
+  EXPECT_EQ(some, (std::vector<std::uint8_t>{2, 3, 0x11}));
+  EXPECT_EQ(all, (std::vector<std::uint8_t>{0x11, 0x11, 1, 2, 3, 0x11, 7, 0x11}));
 }
 
 }  // namespace palpate::gpu::command_stream_test
