@@ -11,7 +11,7 @@ namespace palpate {
 
 PacketDeframer::PacketDeframer(PacketFormat format) : format_(std::move(format)) {}
 
-void PacketDeframer::push(Bytes bytes, std::vector<ParsedFrame>& frames) {
+void PacketDeframer::push(Bytes bytes, std::vector<Frame>& frames) {
   buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
   while (at_ < buffer_.size() && take_step(frames)) {
   }
@@ -24,7 +24,7 @@ void PacketDeframer::push(Bytes bytes, std::vector<ParsedFrame>& frames) {
   }
 }
 
-bool PacketDeframer::take_step(std::vector<ParsedFrame>& frames) {
+bool PacketDeframer::take_step(std::vector<Frame>& frames) {
   if (!in_step_ && !follows_terminator()) {
     return drop_byte();
   }
@@ -79,7 +79,7 @@ bool PacketDeframer::follows_terminator() const {
          begins_like(Bytes(buffer_).subspan(at_ - bytes, bytes), format_.terminator);
 }
 
-bool PacketDeframer::decode(Bytes packet, std::vector<ParsedFrame>& frames) {
+bool PacketDeframer::decode(Bytes packet, std::vector<Frame>& frames) {
   const auto behind = [&](const PacketFormat::Place& place) {
     return packet.subspan(format_.begin_of(place, packet.size()));
   };
@@ -94,9 +94,6 @@ bool PacketDeframer::decode(Bytes packet, std::vector<ParsedFrame>& frames) {
   if (packet.size() < format_.bytes || (packet.size() > format_.bytes && !format_.parts)) {
     return false;
   }
-  if (!format_.parts) {
-    time_s_.reset();  // parts may come behind the clock's packet
-  }
   if (is_passed_over(format_.bytes)) {
     return true;
   }
@@ -104,7 +101,6 @@ bool PacketDeframer::decode(Bytes packet, std::vector<ParsedFrame>& frames) {
     read_clock(format_.time->clock, behind(format_.time->place));
   }
   if (const auto& values = format_.values) {
-    values_.clear();
     const Bytes bytes = behind(values->place);
     for (std::size_t element = 0; element < format_.elements; ++element) {
       append_value(
@@ -166,7 +162,7 @@ double PacketDeframer::tick_of(double ticks) {
   return tick_s_;
 }
 
-void PacketDeframer::read_part(const FoundPart& found, std::vector<ParsedFrame>& frames) {
+void PacketDeframer::read_part(const FoundPart& found, std::vector<Frame>& frames) {
   const auto& [part, content] = found;
   if (part->values == 0) {
     return;
@@ -190,8 +186,8 @@ void PacketDeframer::append_value(double number) {
   values_.push_back(std::isfinite(value) ? value : std::numeric_limits<double>::quiet_NaN());
 }
 
-void PacketDeframer::complete_frame(std::vector<ParsedFrame>& frames) {
-  frames.push_back({values_, time_s_});
+void PacketDeframer::complete_frame(std::vector<Frame>& frames) {
+  frames.push_back({.device_time_s = time_s_, .values = values_});
   values_.clear();
   time_s_.reset();
 }

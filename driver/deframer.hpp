@@ -10,12 +10,6 @@
 
 namespace palpate {
 
-/// One frame decoded from a board's bytes.
-struct ParsedFrame {
-  std::vector<double> values;  ///< [e] in the board's pressure unit; NaN for a non-finite reading
-  std::optional<double> device_time_s = {};  ///< by the board's clock, if the board sends a time
-};
-
 /// Finds packets of a declared format in a byte stream, which may begin anywhere, lose bytes and
 /// hold other packets, and decodes them into frames. Accepts any bytes and does no I/O.
 ///
@@ -44,8 +38,8 @@ class PacketDeframer {
   explicit PacketDeframer(PacketFormat format);
 
   /// Takes the next bytes of the stream, in pieces of any size, and appends the frames that they
-  /// complete. A non-finite reading becomes NaN.
-  void push(Bytes bytes, std::vector<ParsedFrame>& frames);
+  /// complete: their values, NaN for a non-finite reading, and their time by the board's clock.
+  void push(Bytes bytes, std::vector<Frame>& frames);
   /// Counts packets with a wrong checksum, and bytes that belong to no packet.
   const SensorCounters& counters() const { return counters_; }
 
@@ -56,20 +50,20 @@ class PacketDeframer {
   };
 
   /// Takes a packet or drops a byte; false where more bytes have to come first.
-  bool take_step(std::vector<ParsedFrame>& frames);
+  bool take_step(std::vector<Frame>& frames);
   /// Returns true: a step is taken.
   bool drop_byte();
   bool follows_terminator() const;
   /// Decodes a packet, and appends the frames that it completes; false where it is malformed.
-  bool decode(Bytes packet, std::vector<ParsedFrame>& frames);
+  bool decode(Bytes packet, std::vector<Frame>& frames);
   /// Finds the parts in front of the first whose tag is not known; false where one is cut short.
   bool find_parts(Bytes bytes);
   void read_clock(const PacketFormat::Clock& clock, Bytes bytes);
   /// The unit of a clock that does not state it, from its first step; 0 where it is not known yet.
   double tick_of(double ticks);
-  void read_part(const FoundPart& found, std::vector<ParsedFrame>& frames);
+  void read_part(const FoundPart& found, std::vector<Frame>& frames);
   void append_value(double number);
-  void complete_frame(std::vector<ParsedFrame>& frames);
+  void complete_frame(std::vector<Frame>& frames);
 
   PacketFormat format_;
   std::vector<std::uint8_t> buffer_;  // recent bytes of the stream

@@ -12,7 +12,6 @@
 #include <thread>
 #include <utility>
 
-#include "driver/deframer.hpp"
 #include "palpate/sensor.hpp"
 
 namespace palpate {
@@ -68,13 +67,13 @@ class QueuedSensor : public Sensor {
   }
   /// Counts frames that are known to be lost before the next.
   void lose(std::uint64_t frames) { lost_before_next_ += frames; }
-  void push(ParsedFrame frame, double host_time_s) {
+  /// Queues a frame that a deframer has made of bytes that came at this time.
+  void push(Frame frame, double host_time_s) {
+    frame.host_time_s = host_time_s;
+    frame.lost_before = std::exchange(lost_before_next_, 0);
     {
       const std::lock_guard lock(mutex_);
-      frames_.push_back({.host_time_s = host_time_s,
-                         .device_time_s = frame.device_time_s,
-                         .values = std::move(frame.values),
-                         .lost_before = std::exchange(lost_before_next_, 0)});
+      frames_.push_back(std::move(frame));
       ++pushed_;
       if (frames_.size() > capacity) {
         const std::uint64_t missing = frames_.front().lost_before + 1;

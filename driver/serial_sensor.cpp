@@ -247,7 +247,7 @@ class SerialSensor final : public QueuedSensor {
     SensorCounters counters = deframer_->counters();
     counters.lost = counters.checksum_errors;
     lose(counters.lost - lost_before);
-    for (ParsedFrame& frame : parsed_) {
+    for (Frame& frame : parsed_) {
       push(std::move(frame), host_time_s);
     }
     publish(counters);
@@ -260,7 +260,7 @@ class SerialSensor final : public QueuedSensor {
   // Between start() and stop(), only the sensor's thread reads the port and uses these.
   std::unique_ptr<SerialPort> port_;
   std::optional<PacketDeframer> deframer_;
-  std::vector<ParsedFrame> parsed_;
+  std::vector<Frame> parsed_;
 
   std::atomic<bool> stopping_ = false;
 };

@@ -105,7 +105,7 @@ void Deframer::reset() {
   frame_fits_ = true;
 }
 
-std::optional<ParsedFrame> Deframer::push(std::span<const std::uint8_t> bytes, bool ended) {
+std::optional<Frame> Deframer::push(std::span<const std::uint8_t> bytes, bool ended) {
   const std::size_t frame_bytes = 4 * calibrations_.size();
   if (frame_fits_ && frame_.size() + bytes.size() <= frame_bytes) {
     frame_.insert(frame_.end(), bytes.begin(), bytes.end());
@@ -118,7 +118,7 @@ std::optional<ParsedFrame> Deframer::push(std::span<const std::uint8_t> bytes, b
   if (!ended) {
     return std::nullopt;
   }
-  std::optional<ParsedFrame> frame;
+  std::optional<Frame> frame;
   if (frame_.size() == frame_bytes) {
     frame.emplace();
     for (std::size_t cell = 0; cell < calibrations_.size(); ++cell) {

@@ -7,8 +7,8 @@
 
 #include <glm/vec2.hpp>
 
-#include "driver/deframer.hpp"
 #include "driver/device.hpp"
+#include "palpate/sensor.hpp"
 
 namespace palpate::takktile {
 
@@ -85,7 +85,7 @@ class Deframer {
   Deframer(std::vector<Calibration> calibrations, std::uint64_t& garbage_bytes);
 
   /// Takes the next bytes. Where they end a frame and its length is right, returns it.
-  std::optional<ParsedFrame> push(std::span<const std::uint8_t> bytes, bool ended);
+  std::optional<Frame> push(std::span<const std::uint8_t> bytes, bool ended);
   void reset();
 
  private:

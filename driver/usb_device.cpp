@@ -108,11 +108,6 @@ std::vector<std::uint8_t> UsbHandle::control_in(std::uint8_t request, std::uint1
   return reply;
 }
 
-void UsbHandle::clear_halt(std::uint8_t endpoint) {
-  checked(device_, fmt::format("clearing the stall of endpoint 0x{:02X}", endpoint),
-          libusb_clear_halt(handle_.get(), endpoint));
-}
-
 TransferRing::TransferRing(const UsbContext& context, UsbHandle& handle, std::uint8_t endpoint,
                            std::size_t transfer_bytes, SensorCounters& counters)
     : context_(context.get()),
@@ -149,7 +144,8 @@ std::vector<TransferRing::Completion> TransferRing::completed() {
 
 void TransferRing::recover() {
   drain();
-  handle_.clear_halt(endpoint_);
+  checked(handle_.device(), fmt::format("clearing the stall of endpoint 0x{:02X}", endpoint_),
+          libusb_clear_halt(handle_.get(), endpoint_));
   halted_ = false;
   begin();
 }

@@ -44,7 +44,6 @@ class UsbHandle {
   /// @throws Error where the device fails
   std::vector<std::uint8_t> control_in(std::uint8_t request, std::uint16_t length,
                                        std::uint16_t value = 0, std::uint16_t index = 0);
-  void clear_halt(std::uint8_t endpoint);
 
   const ListedDevice& device() const { return device_; }
   libusb_device_handle* get() const { return handle_.get(); }

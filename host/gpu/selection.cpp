@@ -1,8 +1,8 @@
 #include "gpu/selection.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cstdlib>
+#include <cstring>
 #include <iterator>
 #include <optional>
 #include <utility>
@@ -89,18 +89,11 @@ Candidate inspect(VkPhysicalDevice physical, int index) {
   return candidate;
 }
 
-std::string lower(std::string_view text) {
-  std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return result;
-}
-
 bool matches(const DeviceInfo& info, std::string_view name_or_index) {
   if (const auto index = whole_number_of(name_or_index)) {
     return info.index == *index;
   }
-  return lower(info.name).find(lower(name_or_index)) != std::string::npos;
+  return strcasestr(info.name.c_str(), std::string(name_or_index).c_str()) != nullptr;
 }
 
 }  // namespace

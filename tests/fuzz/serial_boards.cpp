@@ -48,11 +48,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   const std::size_t piece = (rest.empty() ? 0 : rest[0]) + std::size_t{1};
   palpate::PacketDeframer deframer(profile.packet);
-  std::vector<palpate::ParsedFrame> frames;
+  std::vector<palpate::Frame> frames;
   for (; !rest.empty(); rest = rest.subspan(std::min(piece, rest.size()))) {
     deframer.push(rest.first(std::min(piece, rest.size())), frames);
   }
-  for (const palpate::ParsedFrame& frame : frames) {
+  for (const palpate::Frame& frame : frames) {
     expect(frame.values.size() == profile.elements_mm.size());
     expect(std::ranges::none_of(frame.values, [](double value) { return std::isinf(value); }));
   }

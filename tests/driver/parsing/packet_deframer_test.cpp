@@ -84,7 +84,7 @@ TEST_P(ShippedBoard, IsInStepTwoFramesAfterDamage) {
     const Bytes stream = stream_of(damaged);
     receiver.push_in_pieces(stream, [&] { return 1 + random_() % 200; });
     SCOPED_TRACE(trial);
-    for (const ParsedFrame& frame : receiver.frames()) {
+    for (const Frame& frame : receiver.frames()) {
       ASSERT_EQ(frame.values.size(), profile_.elements_mm.size());
       ASSERT_TRUE(std::ranges::none_of(frame.values, [](double v) { return std::isinf(v); }));
     }
@@ -133,7 +133,7 @@ TEST(PacketDeframer, FindsTheFieldsBehindCountedParts) {
 
 TEST(EndlessGarbage, NeedsNoMoreMemoryThanItsFirstBytes) {
   PacketDeframer deframer(read_serial_profile("wts").packet);
-  std::vector<ParsedFrame> frames;
+  std::vector<Frame> frames;
   const Bytes piece(64, 0x00);
   constexpr int pieces = 1000;
   deframer.push(piece, frames);

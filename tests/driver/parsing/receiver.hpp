@@ -34,7 +34,7 @@ class Receiver {
   bool has(const std::vector<SentFrame>& sent, std::size_t begin, std::size_t end) const {
     auto at = frames_.begin();
     for (std::size_t i = begin; i < end; ++i) {
-      at = std::ranges::find(at, frames_.end(), sent[i].values, &ParsedFrame::values);
+      at = std::ranges::find(at, frames_.end(), sent[i].values, &Frame::values);
       if (at == frames_.end()) {
         return false;
       }
@@ -50,19 +50,19 @@ class Receiver {
 
   /// Number of frames that were not sent.
   auto strangers(const std::vector<SentFrame>& sent) const {
-    return std::ranges::count_if(frames_, [&](const ParsedFrame& frame) {
+    return std::ranges::count_if(frames_, [&](const Frame& frame) {
       return std::ranges::find(sent, frame.values, &SentFrame::values) == sent.end();
     });
   }
 
   void clear() { frames_.clear(); }
-  const std::vector<ParsedFrame>& frames() const { return frames_; }
+  const std::vector<Frame>& frames() const { return frames_; }
   std::uint64_t garbage() const { return deframer_.counters().garbage_bytes; }
   std::uint64_t checksum_errors() const { return deframer_.counters().checksum_errors; }
 
  private:
   PacketDeframer deframer_;
-  std::vector<ParsedFrame> frames_;
+  std::vector<Frame> frames_;
 };
 
 }  // namespace palpate

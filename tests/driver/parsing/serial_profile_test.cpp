@@ -236,7 +236,7 @@ TEST(MutatedProfile, IsReadOrRefusedInOneLine) {
       for (int i = 0; i < 4; ++i) {
         receiver.send({random_frame(boards[random() % boards.size()], random)});
       }
-      for (const ParsedFrame& frame : receiver.frames()) {
+      for (const Frame& frame : receiver.frames()) {
         ASSERT_EQ(frame.values.size(), profile.elements_mm.size());
       }
       ++read;

@@ -125,7 +125,7 @@ class TakkTileFrames : public testing::TestWithParam<std::size_t> {
   const std::size_t cells_ = GetParam();
   std::uint64_t garbage_bytes_ = 0;
   Deframer deframer_{std::vector<Calibration>(cells_, plain), garbage_bytes_};
-  std::vector<ParsedFrame> frames_;
+  std::vector<Frame> frames_;
   std::uint64_t pushed_bytes_ = 0;
   std::uint64_t framed_bytes_ = 0;
 };
@@ -167,7 +167,7 @@ TEST_P(TakkTileFrames, AreNeverHalfBehindForeignPackets) {
     }
     push(packets_of(cells_, 50));
     push(packets_of(cells_, 55));
-    for (const ParsedFrame& frame : frames_) {
+    for (const Frame& frame : frames_) {
       ASSERT_EQ(frame.values.size(), cells_);
     }
     frames_.clear();
