@@ -106,6 +106,12 @@ std::vector<Tick> even_ticks(double lower, double upper, int count, double small
   return ticks;
 }
 
+glm::dvec2 lower_edge_mm(const OccupancyGrid& map) { return map.origin_mm - 0.5 * map.cell_mm; }
+
+glm::dvec2 upper_edge_mm(const OccupancyGrid& map) {
+  return lower_edge_mm(map) + map.cell_mm * glm::dvec2(map.nx, map.ny);
+}
+
 void draw_cells(Canvas& canvas, const View& view, const OccupancyGrid& map,
                 const EvidenceScale& scale) {
   const double prior = map.prior_log_odds();

@@ -9,7 +9,7 @@
 #include <glm/vec2.hpp>
 
 #include "figures/canvas.hpp"
-#include "figures/evidence_scale.hpp"
+#include "figures/palette.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 
@@ -57,6 +57,10 @@ void draw_axes(Canvas& canvas, const View& view, const std::vector<Tick>& x_tick
 void draw_colour_bar(Canvas& canvas, const Box& box, double lower, double upper,
                      const std::function<Colour(double value)>& colour,
                      const std::vector<Tick>& ticks, std::string_view caption);
+
+/// Returns a corner of the area that the map's cells cover, in mm in the object frame.
+glm::dvec2 lower_edge_mm(const OccupancyGrid& map);
+glm::dvec2 upper_edge_mm(const OccupancyGrid& map);
 
 /// Draws the map in a view of its own frame.
 void draw_cells(Canvas& canvas, const View& view, const OccupancyGrid& map,

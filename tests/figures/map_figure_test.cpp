@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "figures/evidence_scale.hpp"
 #include "figures/figures.hpp"
 #include "figures/view.hpp"
 #include "picture.hpp"
