@@ -21,11 +21,11 @@ std::uint32_t reflected(std::uint32_t value, std::size_t bits) {
 /// A CRC's register after one more byte, whose most significant bit comes first.
 std::uint32_t after_byte(std::uint32_t crc, std::uint32_t byte, std::uint32_t polynomial,
                          std::size_t bytes) {
-  const std::size_t width = 8 * bytes;
-  crc ^= byte << (width - 8);
-  for (int bit = 0; bit < 8; ++bit) {
-    const bool carry = (crc >> (width - 1) & 1u) != 0;
-    crc = (crc << 1 ^ (carry ? polynomial : 0)) & mask_of(bytes);
+  const std::uint32_t mask = mask_of(bytes);
+  const std::uint32_t top_bit = mask ^ mask >> 1;
+  for (int bit = 7; bit >= 0; --bit) {
+    const bool carry = ((crc & top_bit) != 0) != ((byte >> bit & 1u) != 0);
+    crc = (crc << 1 ^ (carry ? polynomial : 0)) & mask;
   }
   return crc;
 }
