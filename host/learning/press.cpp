@@ -12,7 +12,6 @@
 #include <tbb/parallel_for.h>
 
 #include "learning/observed_map.hpp"
-#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

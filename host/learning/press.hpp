@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "palpate/contact.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"

@@ -13,6 +13,7 @@
 #include "learning/progress.hpp"
 #include "learning/setup_judge.hpp"
 #include "model/element_spacing.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
