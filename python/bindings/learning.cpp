@@ -12,8 +12,8 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "json.hpp"
-#include "learning/calibration_task.hpp"
 #include "learning/map_task.hpp"
+#include "learning/sensor_calibration.hpp"
 #include "learning/setup_check.hpp"
 #include "model/element_spacing.hpp"
 #include "model/option_words.hpp"
@@ -112,6 +112,12 @@ SensorCalibration calibrate(const std::vector<Recording>& recordings, PythonRequ
   return calibrate_sensor(task.presses, task.maps, task.options, report);
 }
 
+Json to_json(const ComparedScores& scores) {
+  return {{"before", to_json(scores.before)},
+          {"table", to_json(scores.table)},
+          {"after", to_json(scores.after)}};
+}
+
 Json to_json(const SensorCalibration& calibration) {
   Json json{{"objects", calibration.objects}, {"tried", Json::array()}};
   for (const TriedTable& table : calibration.tried) {
@@ -119,16 +125,12 @@ Json to_json(const SensorCalibration& calibration) {
                              {"levels", table.kind.levels},
                              {"log_loss", table.log_loss}});
   }
-  if (calibration.before) {
-    json["before"] = to_json(*calibration.before);
-    json["table"] = to_json(*calibration.table);
-    json["after"] = to_json(*calibration.after);
+  if (calibration.touches) {
+    json.update(to_json(*calibration.touches));
   }
-  if (const auto& groups = calibration.groups) {
-    json["groups"] = {{"touches", groups->touches},
-                      {"before", to_json(groups->before)},
-                      {"table", to_json(groups->table)},
-                      {"after", to_json(groups->after)}};
+  if (calibration.groups) {
+    json["groups"] = {{"touches", presses_in_group}};
+    json["groups"].update(to_json(*calibration.groups));
   }
   if (calibration.array_offset) {
     json["array_offset"] = to_json(*calibration.array_offset, in_keywords);
