@@ -20,6 +20,9 @@ def device() -> palpate.Device:
     return palpate.Device.open(os.environ.get("PALPATE_DEVICE", "llvmpipe"))
 
 
+Maps = list[palpate.OccupancyGrid]
+
+
 def learned(device: palpate.Device, letter: str) -> palpate.OccupancyGrid:
     """The map of a letter, from touches of seed 1."""
     builder = palpate.MapBuilder(device)
@@ -28,8 +31,14 @@ def learned(device: palpate.Device, letter: str) -> palpate.OccupancyGrid:
 
 
 @pytest.fixture(scope="session")
-def maps(device: palpate.Device) -> list[palpate.OccupancyGrid]:
+def maps(device: palpate.Device) -> Maps:
     return [learned(device, letter) for letter in "AEI"]
+
+
+@pytest.fixture
+def belief(device: palpate.Device, maps: Maps) -> palpate.PoseHistogram:
+    """Of A, E and I, before any touch."""
+    return palpate.PoseHistogram(device, maps)
 
 
 @pytest.fixture(scope="session")
@@ -41,6 +50,13 @@ def unknown() -> palpate.Recording:
         T_object_robot=palpate.random_object_pose(seed=2),
         seed=3,
     )
+
+
+@pytest.fixture
+def posterior(belief: palpate.PoseHistogram, unknown: palpate.Recording) -> palpate.PoseHistogram:
+    """The belief after the nine touches."""
+    belief.update(unknown)
+    return belief
 
 
 def run(*arguments: object, cwd: pathlib.Path | None = None) -> "subprocess.CompletedProcess[str]":
@@ -79,9 +95,7 @@ def warned(call: Callable[..., Any], *arguments: object, **named: object) -> tup
     return value, " ".join(str(warning.message) for warning in said)
 
 
-def expect_refused(
-    call: Callable[[], object], *arguments: object, spelled: Mapping[str, str] = {}
-) -> None:
+def expect_refused(call: Callable[[], object], *arguments: object, spelled: Mapping[str, str] = {}) -> None:
     """The call is refused as the command with the arguments is, but for how each spells options.
     `spelled` has how Python spells each option that the command's words name."""
     words, said = refusal(*arguments), error_of(call)

@@ -4,12 +4,10 @@ from typing import Any
 
 import numpy
 import pytest
-from conftest import error_of
+from conftest import Maps, error_of
 
 import palpate
 from palpate import reference
-
-Maps = list[palpate.OccupancyGrid]
 
 
 def test_a_pose_is_refined_near_the_mode_that_is_given(
@@ -74,12 +72,10 @@ def test_recordings_of_different_units_are_not_recognised_together(
 
 
 def test_likely_bins_and_modes_are_the_belief(
-    device: palpate.Device, maps: Maps, unknown: palpate.Recording
+    device: palpate.Device, maps: Maps, unknown: palpate.Recording, posterior: palpate.PoseHistogram
 ) -> None:
-    belief = palpate.PoseHistogram(device, maps)
-    belief.update(unknown)
-    bins, shares = belief.likely_bins(1, 1e-7)
-    logs = belief.log_likelihood(1).ravel()
+    bins, shares = posterior.likely_bins(1, 1e-7)
+    logs = posterior.log_likelihood(1).ravel()
     expected = numpy.exp(logs - logs.max())
     assert shares == pytest.approx(expected[bins] / expected.sum(), rel=1e-3)
     assert shares.sum() == pytest.approx(1.0, abs=1e-3)

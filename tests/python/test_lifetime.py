@@ -8,6 +8,7 @@ import sys
 
 import numpy
 import pytest
+from conftest import Maps
 
 import palpate
 
@@ -39,9 +40,7 @@ def resident_kib() -> int:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") // 1024
 
 
-def test_objects_outlive_their_device_and_their_arrays(
-    maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
-) -> None:
+def test_objects_outlive_their_device_and_their_arrays(maps: Maps, unknown: palpate.Recording) -> None:
     device = palpate.Device.open(os.environ.get("PALPATE_DEVICE", "llvmpipe"))
     builder = palpate.MapBuilder(device)
     beliefs = [
@@ -63,7 +62,7 @@ def test_objects_outlive_their_device_and_their_arrays(
 
 
 def test_a_thousand_constructions_take_no_memory(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
+    device: palpate.Device, maps: Maps, unknown: palpate.Recording
 ) -> None:
     lattice = palpate.PoseLattice((-5, 5, 10), (-5, 5, 10), (0, 6.28, 8))
 

@@ -1,9 +1,9 @@
 """The example node's work without ROS: touches are found and recognised, messages say what was found."""
 
-import ast
 import importlib
 import math
 import pathlib
+import runpy
 import sys
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +11,7 @@ from unittest.mock import MagicMock
 
 import numpy
 import pytest
-from conftest import error_of, learned, warned
+from conftest import Maps, error_of, learned, warned
 from rosbags.typesys import Stores, get_typestore
 
 import palpate
@@ -163,7 +163,7 @@ def test_planar_poses_are_those_of_a_bag(tmp_path: pathlib.Path) -> None:
 
 
 def test_frames_of_another_array_and_touches_at_the_start_are_refused(
-    maps: list[palpate.OccupancyGrid], frames: list[palpate.Frame]
+    maps: Maps, frames: list[palpate.Frame]
 ) -> None:
     array = palpate.Recording(numpy.zeros((2, 36)), [(0, 0, 0)] * 2, palpate.digitacts_array())
     stream = session.Session(array, maps)
@@ -235,7 +235,7 @@ class StandIns:
 
 
 def test_the_node_publishes_what_it_finds(
-    maps: list[palpate.OccupancyGrid], frames: list[palpate.Frame], tmp_path: pathlib.Path,
+    maps: Maps, frames: list[palpate.Frame], tmp_path: pathlib.Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     for grid in maps[:2]:
@@ -270,19 +270,14 @@ def test_the_node_publishes_what_it_finds(
     assert "35 readings for an array of 36 elements" in ros.said[-1]
 
 
-def test_the_launch_file_has_the_nodes_parameters() -> None:
-    node = ast.parse((ROOT / "palpate_ros2" / "node.py").read_text())
-    declared = {
-        call.args[0].value: call.args[1].value
-        for call in ast.walk(node)
-        if isinstance(call, ast.Call) and getattr(call.func, "id", "") in ("text", "number")
-    }
-    launch = ast.parse((ROOT / "launch" / "recognise.launch.py").read_text())
-    given = {
-        target.id: ast.literal_eval(step.value)
-        for step in launch.body
-        if isinstance(step, ast.Assign)
-        for target in step.targets
-    }
-    numbers = {name: float(value) for name, value in given["NUMBERS"].items()}
-    assert {**given["TEXTS"], **numbers} == declared
+def test_the_launch_takes_the_nodes_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
+    ros: Any = MagicMock()
+    for name in ("launch", "launch.actions", "launch.substitutions", "launch_ros.actions",
+                 "launch_ros.parameter_descriptions"):  # fmt: skip
+        monkeypatch.setitem(sys.modules, name, ros)
+    runpy.run_path(str(ROOT / "launch" / "recognise.launch.py"))["generate_launch_description"]()
+    [node] = ros.Node.call_args_list
+    [values] = node.kwargs["parameters"]
+    assert {"maps", "pressure_topic", "onset"} <= values.keys()
+    declared = [each.args[0] for each in ros.DeclareLaunchArgument.call_args_list]
+    assert declared == list(values)

@@ -47,9 +47,7 @@ def test_records_of_what_is_in_memory(files: Files) -> None:
     assert comparable(given) == comparable(expected)
 
 
-def test_the_cells_of_a_map_and_the_readings_of_a_simulation(
-    files: Files, device: palpate.Device
-) -> None:
+def test_the_cells_of_a_map_and_the_readings_of_a_simulation(files: Files, device: palpate.Device) -> None:
     builder = palpate.MapBuilder(device)
     builder.add(palpate.read_recording(files.train[0]))
     assert numpy.array_equal(builder.build("A").log_odds, palpate.read_map(files.maps / "A.map.h5").log_odds)

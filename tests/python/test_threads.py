@@ -9,12 +9,12 @@ import threading
 import numpy
 import pytest
 import tqdm
+from conftest import Maps
 
 import palpate
 
 # Updates by nine touches of this lattice take a tenth of a second and more.
 LARGE = palpate.PoseLattice(x_mm=(-20, 20, 60), y_mm=(-20, 20, 60), theta_rad=(0, 6.28, 30))
-Maps = list[palpate.OccupancyGrid]
 
 
 def test_other_threads_and_signal_handlers_run_during_an_update(
@@ -100,10 +100,8 @@ def test_progress_comes_on_the_calling_thread(
 
 
 def test_what_progress_raises_ends_the_call(
-    device: palpate.Device, maps: Maps, unknown: palpate.Recording
+    device: palpate.Device, belief: palpate.PoseHistogram, unknown: palpate.Recording
 ) -> None:
-    belief = palpate.PoseHistogram(device, maps)
-
     def refuse(fraction: float) -> None:
         raise ZeroDivisionError
 
