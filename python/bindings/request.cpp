@@ -35,25 +35,15 @@ Value typed(nb::handle value) {
 
 /// What Python gives for the value of an option.
 template <typename Value>
-struct Given {
-  using Type = std::conditional_t<std::is_enum_v<Value>, std::string, Value>;
-};
+struct Given : std::type_identity<std::conditional_t<std::is_enum_v<Value>, std::string, Value>> {};
 template <>
-struct Given<Bins> {
-  using Type = std::variant<std::array<int, 3>, std::string>;
-};
+struct Given<Bins> : std::type_identity<std::variant<std::array<int, 3>, std::string>> {};
 template <>
-struct Given<Pivot> {
-  using Type = std::variant<std::array<double, 2>, std::string>;
-};
+struct Given<Pivot> : std::type_identity<std::variant<std::array<double, 2>, std::string>> {};
 template <>
-struct Given<NoneWeight> {
-  using Type = std::variant<double, std::string>;
-};
+struct Given<NoneWeight> : std::type_identity<std::variant<double, std::string>> {};
 template <>
-struct Given<Frames> {
-  using Type = std::array<std::int64_t, 2>;
-};
+struct Given<Frames> : std::type_identity<std::array<std::int64_t, 2>> {};
 
 /// The text of an option's value, as a flag has it.
 struct OptionText {
@@ -62,11 +52,11 @@ struct OptionText {
 
   template <typename Value>
   std::string operator()(Value Request::* /*of*/) const {
-    return text(typed<typename Given<Value>::Type>(given));
+    return text(typed<typename Given<Value>::type>(given));
   }
   template <typename Value>
   std::string operator()(std::optional<Value> Request::* /*of*/) const {
-    return text(typed<typename Given<Value>::Type>(given));
+    return text(typed<typename Given<Value>::type>(given));
   }
 
  private:

@@ -36,7 +36,7 @@ _POSES = {
 #: Lists of flags beside the readings that say which of them are valid.
 _FLAGS = ("valid", "validity", "is_valid", "mask", "valid_mask")
 #: Kinds of fields in definitions of rosbags: Nodetype.
-_BASE, _NAME, _LISTS = 1, 2, (3, 4)
+_NAME, _LISTS = 2, (3, 4)
 #: What mends a log that was cut off.
 _MENDED_BY = {".bag": "rosbag reindex {}", ".mcap": "mcap recover {} -o MENDED.mcap"}
 _TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
@@ -73,70 +73,58 @@ class Bag:
         _, kind = self.fields(msgtype).get("header", (0, ""))
         return bool(kind == "std_msgs/msg/Header")
 
-    def lists(self, msgtype: str, path: str = "", within: tuple[str, ...] = ()) -> Iterator[str]:
-        """The dotted paths of lists of numbers, also of one number in each item of a list."""
-        for name, (kind, what) in self.fields(msgtype).items():
+    def lists(
+        self, msgtype: str, path: str = "", in_list: bool = False, within: tuple[str, ...] = ()
+    ) -> Iterator[tuple[str, str]]:
+        """The dotted paths of lists of numbers, also of one number in each item of a list, and the name of the
+        flags beside each; "" where there are none."""
+        fields = self.fields(msgtype)
+        flags = next((name for name in _FLAGS if name in fields), "")
+        for name, (kind, what) in fields.items():
             here = f"{path}.{name}" if path else name
-            if name == "header" or (kind == _NAME and what in within):
-                continue
-            if kind == _NAME:
-                yield from self.lists(what, here, (*within, msgtype))
-            elif kind in _LISTS and what[0][0] == _NAME:
-                inner = what[0][1]
-                if inner not in within and not inner.endswith("/MultiArrayDimension"):
-                    yield from self.lists(inner, here, (*within, msgtype))
-                    yield from (
-                        f"{here}.{member}"
-                        for member, (of, base) in self.fields(inner).items()
-                        if of == _BASE and base[0].startswith(("float", "int", "uint"))
-                    )
-            elif kind in _LISTS and what[0][1][0].startswith(("float", "int", "uint")):
-                yield here
+            is_list = kind in _LISTS
+            of, inner = what[0] if is_list else (kind, what)
+            if of == _NAME:
+                if name != "header" and inner not in within and not inner.endswith("/MultiArrayDimension"):
+                    yield from self.lists(inner, here, is_list, (*within, msgtype))
+            elif (is_list or in_list) and inner[0].startswith(("float", "int", "uint")):
+                yield here, flags
 
     def pressure_path(self, msgtype: str) -> str | None:
         """Where the pressures of a type lie; None where several lists may be meant, or none."""
-        found = list(self.lists(msgtype))
+        found = dict(self.lists(msgtype))
         known = _PRESSURES.get(msgtype)
         readings = [path for path in found if path.rpartition(".")[2] not in _FLAGS]
         return known if known in found else readings[0] if len(readings) == 1 else None
 
-    def flags(self, msgtype: str, path: str) -> str | None:
-        """Where the flags beside the readings of a path lie."""
-        beside = path.rpartition(".")[0]
-        of = msgtype
-        for field in filter(None, _without_keys(beside).split(".")):
-            kind, what = self.fields(of)[field]
-            of = what if kind == _NAME else what[0][1]
-        fields = self.fields(of)
-        return next((f"{beside}.{name}".lstrip(".") for name in _FLAGS if name in fields), None)
-
     def pressures(self, topic: str, path: str | None) -> Pressures:
         msgtype = self.type_of(topic)
+        where = f"{self.name}: {topic}: {msgtype}"
         if path is None:
             path = self.pressure_path(msgtype)
-        found = list(self.lists(msgtype))
+        found = dict(self.lists(msgtype))
         if path is None and found:
-            raise Error(
-                f"{self.name}: {topic}: {msgtype} has the lists {', '.join(found)}; name one by "
-                "pressure_field"
-            )
+            raise Error(f"{where} has the lists {', '.join(found)}; name one by pressure_field")
         if path is None or _without_keys(path) not in found:
             raise Error(
-                f"{self.name}: {topic}: {msgtype} has no list of numbers"
+                f"{where} has no list of numbers"
                 + (f" {path}; it has {', '.join(found)}" if path and found else "; give another topic")
             )
-        return Pressures(self.name, topic, path, self.has_header(msgtype), self.flags(msgtype, path))
+        flags = found[_without_keys(path)]
+        beside = f"{path.rpartition('.')[0]}.{flags}".lstrip(".") if flags else None
+        return Pressures(self.name, topic, path, self.has_header(msgtype), beside)
 
     def poses(self, topic: str, path: str | None) -> Poses:
         msgtype = self.type_of(topic)
+        where = f"{self.name}: {topic}: {msgtype}"
         first = re.split(r"[.[]", path or "")[0]
         if path is None and msgtype not in _POSES:
             raise Error(
-                f"{self.name}: {topic}: {msgtype} is no pose; name its field by pose_field, give a topic of "
+                f"{where} is no pose; name its field by pose_field, give a topic of "
                 f"{', '.join(sorted(_POSES))}, or frames by tf"
             )
         if first and first not in (fields := self.fields(msgtype)):
-            raise Error(f"{self.name}: {topic}: {msgtype} has no field {first}; it has {', '.join(fields)}")
+            raise Error(f"{where} has no field {first}; it has {', '.join(fields)}")
         return Poses(self.name, topic, _POSES[msgtype] if path is None else path, self.has_header(msgtype))
 
     def transforms(self, wanted: list[tuple[str, str]]) -> Transforms:

@@ -222,13 +222,10 @@ def evaluate(
     """
     if isinstance(results, (Mapping, Recognized, str, bytes, os.PathLike)):
         results = [results]
-    paths: list[str] = []
-    records: list[Any] = []
-    for item in results:
-        if isinstance(item, (str, bytes, os.PathLike)):
-            paths.append(os.fsdecode(item))
-        else:
-            records.append(item.record if isinstance(item, Recognized) else item)
+    items: list[Any] = list(results)
+    paths = [os.fsdecode(item) for item in items if isinstance(item, (str, bytes, os.PathLike))]
+    records = [item.record if isinstance(item, Recognized) else item
+               for item in items if not isinstance(item, (str, bytes, os.PathLike))]  # fmt: skip
     # As in the command's JSON, numbers that are not finite are null, and names need not be UTF-8.
     finite = json.loads(json.dumps(records), parse_constant=lambda _: None)
     text = json.dumps(finite, ensure_ascii=False).encode(errors="replace")
