@@ -23,11 +23,16 @@ def device() -> palpate.Device:
 Maps = list[palpate.OccupancyGrid]
 
 
+def built(device: palpate.Device, touches: palpate.Recording, **options: Any) -> palpate.OccupancyGrid:
+    """The map of touches of one object."""
+    builder = palpate.MapBuilder(device, **options)
+    builder.add(touches)
+    return builder.build(touches.object)
+
+
 def learned(device: palpate.Device, letter: str) -> palpate.OccupancyGrid:
     """The map of a letter, from touches of seed 1."""
-    builder = palpate.MapBuilder(device)
-    builder.add(palpate.simulate(letter, seed=1))
-    return builder.build(letter)
+    return built(device, palpate.simulate(letter, seed=1))
 
 
 @pytest.fixture(scope="session")
@@ -63,6 +68,12 @@ def run(*arguments: object, cwd: pathlib.Path | None = None) -> "subprocess.Comp
     """Runs the command `palpate` to its end, whatever comes of it."""
     line = [os.environ["PALPATE_COMMAND"], *map(str, arguments)]
     return subprocess.run(line, cwd=cwd, capture_output=True, text=True, timeout=300)
+
+
+def python(script: str, *arguments: str, **environment: str) -> "subprocess.CompletedProcess[str]":
+    """Runs a script in an interpreter of its own."""
+    line, env = [sys.executable, "-c", script, *arguments], {**os.environ, **environment}
+    return subprocess.run(line, capture_output=True, text=True, timeout=120, env=env)
 
 
 def command(*arguments: object, cwd: pathlib.Path | None = None) -> str:

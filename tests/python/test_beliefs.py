@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy
 import pytest
-from conftest import Maps, error_of
+from conftest import Maps, built, error_of
 
 import palpate
 from palpate import reference
@@ -44,9 +44,8 @@ def test_marginals_are_over_the_grid_that_is_given(
 
 
 def test_a_map_is_built_by_the_classifier_that_is_given(device: palpate.Device, maps: Maps) -> None:
-    builder = palpate.MapBuilder(device, classifier=palpate.ContactClassifier(threshold=8.0))
-    builder.add(palpate.simulate("E", seed=1))
-    assert (builder.build("E").log_odds > 0).sum() < (maps[1].log_odds > 0).sum()
+    by_strong = built(device, palpate.simulate("E", seed=1), classifier=palpate.ContactClassifier(threshold=8.0))
+    assert (by_strong.log_odds > 0).sum() < (maps[1].log_odds > 0).sum()
 
 
 def test_bins_and_seeds_are_the_ones_that_are_given() -> None:
@@ -125,9 +124,7 @@ def test_evaluated_bins_are_those_of_the_histogram_and_of_the_reference(
 
 def test_the_reference_has_the_map_of_the_builder(device: palpate.Device) -> None:
     touches = palpate.simulate("A", seed=1)[:20]
-    builder = palpate.MapBuilder(device)
-    builder.add(touches)
-    grid = builder.build("A")
+    grid = built(device, touches)
     expected = reference.log_odds_map(touches, grid)
     # The bound that MapBuilder states.
     assert numpy.all(abs(grid.log_odds - expected) <= numpy.maximum(1e-3, 1e-4 * abs(expected)))

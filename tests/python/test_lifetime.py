@@ -3,12 +3,10 @@ does not hang."""
 
 import gc
 import os
-import subprocess
-import sys
 
 import numpy
 import pytest
-from conftest import Maps
+from conftest import Maps, python
 
 import palpate
 
@@ -26,13 +24,6 @@ def begun(device):
     grid = builder.build("E")
     return builder, grid, palpate.PoseHistogram(device, [grid])
 """
-
-
-def run(script: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-c", BEGIN + script, *arguments], capture_output=True, text=True, timeout=120,
-        env={**os.environ, "PYTHONWARNINGS": "ignore"},  # of forks beside threads
-    )  # fmt: skip
 
 
 def resident_kib() -> int:
@@ -171,8 +162,7 @@ in_update.wait()
 
 def test_the_interpreters_end_holds_calls_of_daemon_threads() -> None:
     before_palpate = "import atexit\nhold = []\natexit.register(lambda: hold[0]())\n"
-    done = subprocess.run([sys.executable, "-c", before_palpate + BEGIN + HELD], capture_output=True, text=True,
-                          timeout=120)  # fmt: skip
+    done = python(before_palpate + BEGIN + HELD)
     assert (done.returncode, done.stderr) == (0, "")
     went_on, refused = done.stdout.splitlines()
     assert went_on == "0"
@@ -181,7 +171,7 @@ def test_the_interpreters_end_holds_calls_of_daemon_threads() -> None:
 
 @pytest.mark.parametrize("work", ["update", "histogram", "bounds", "sensor"])
 def test_the_interpreter_ends_while_daemon_threads_are_in_calls(work: str) -> None:
-    done = run(ENDING, work)
+    done = python(BEGIN + ENDING, work)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
@@ -268,5 +258,5 @@ REFUSED = ["device:"] * 7 + ["sensor:", "device:", "Vulkan:", "Vulkan:", "True 1
     ],
 )
 def test_a_child_of_fork_is_refused_at_once_or_works(state: str, lines: list[str]) -> None:
-    done = run(FORKED, state)
+    done = python(BEGIN + FORKED, state, PYTHONWARNINGS="ignore")  # of forks beside threads
     assert (done.returncode, done.stdout.splitlines(), done.stderr) == (0, lines, "")

@@ -3,16 +3,13 @@ that needs no device works."""
 
 import gc
 import inspect
-import os
 import pathlib
-import subprocess
-import sys
 import weakref
 from typing import Any
 
 import numpy
 import pytest
-from conftest import Maps, error_of
+from conftest import Maps, error_of, python
 
 import palpate
 from palpate import _palpate, reference
@@ -139,12 +136,9 @@ for use in (lambda: palpate.open_sensor("tsf85:none").start(), palpate.Device.op
 
 def test_a_missing_loader_of_vulkan_is_an_error_that_names_the_packages() -> None:
     library = "/nonexistent/libvulkan.so.1"
-    run = subprocess.run(
-        [sys.executable, "-c", WITHOUT_VULKAN], capture_output=True, text=True, timeout=120,
-        env={**os.environ, "PALPATE_VULKAN_LIBRARY": library},
-    )  # fmt: skip
-    assert run.returncode == 0, run.stderr
-    board, *vulkan = run.stdout.splitlines()
+    done = python(WITHOUT_VULKAN, PALPATE_VULKAN_LIBRARY=library)
+    assert done.returncode == 0, done.stderr
+    board, *vulkan = done.stdout.splitlines()
     assert "not plugged in" in board
     assert len(vulkan) == 2
     for line in vulkan:

@@ -2,14 +2,12 @@
 
 import os
 import signal
-import subprocess
-import sys
 import threading
 
 import numpy
 import pytest
 import tqdm
-from conftest import Maps
+from conftest import Maps, python
 
 import palpate
 
@@ -184,9 +182,9 @@ with palpate.open_sensor("simulate:E,rate=1") as sensor:
 
 
 def test_ctrl_c_ends_a_call() -> None:
-    run = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, timeout=120)
-    assert (run.returncode, run.stderr) == (0, "")
-    assert run.stdout.splitlines() == [
+    done = python(INTERRUPTED)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines() == [
         "histogram interrupted", "True", "1.0", "bounds interrupted", "marginals interrupted", "1.0",
         "recognize interrupted", "recognize by bounds interrupted", "map interrupted", "sensor interrupted",
     ]  # fmt: skip
