@@ -171,12 +171,13 @@ class Transforms:
             if edge is None or edge.parent != parent:
                 edge = self.edges[child] = _Edge(parent, static, moves=edge is not None and edge.moves)
                 self._keep_chains()
-            row = row_of(transform.transform)
             if edge.static:
                 edge.rows = Rows()
-                edge.rows.add(0.0, row)
-            elif (self.kept is None or child in self.kept) and not math.isnan(row[3]):
-                edge.rows.add(stamp_s(transform.header.stamp) or received_s, row)
+                edge.rows.add(0.0, row_of(transform.transform))
+            elif self.kept is None or child in self.kept:
+                row = row_of(transform.transform)
+                if not math.isnan(row[3]):
+                    edge.rows.add(stamp_s(transform.header.stamp) or received_s, row)
 
     def _keep_chains(self) -> None:
         """Forgets what the wanted chains do not need, now that a frame has a parent."""

@@ -103,8 +103,8 @@ class Recording(_OverArrays, Drawn):
     """A sequence of readings of one array pressed against one object.
 
     Its arrays are those that were given, where dtype and layout allow; recording[i] is a Touch, and
-    recording[a:b] a Recording over the same memory. plot() draws every reading at its element's place in the
-    robot frame, in mm.
+    recording[a:b] a Recording over the same memory. plot(ax=None) draws every reading at its element's place in
+    the robot frame, in mm, with Matplotlib, and returns the axes.
     """
 
     _free = ("object", "truth")

@@ -25,10 +25,10 @@ def text_of(shown: object) -> str:
 
 
 class Drawn:
-    """What palpate.plots draws."""
+    """What is drawn with Matplotlib."""
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draws it with Matplotlib, as the class says. Returns the axes."""
+        """Draws what the class says. Returns the axes."""
         from .plots import plot
 
         return plot(self, ax)
@@ -73,7 +73,8 @@ class Record(Fields, Drawn):
     it: {"z", "verdict"}. Of a recording that recognize_many() could not recognise there are only its
     name, `touches` (0), `truth` and `error`. docs/files.md lists all keys.
 
-    plot() draws the object's frame and where x and y lie in 68 and 95 %, in the robot frame, in mm.
+    plot(ax=None) draws the object's frame and where x and y lie in 68 and 95 %, in the robot frame, in mm, with
+    Matplotlib, and returns the axes.
     """
 
     def __repr__(self) -> str:
@@ -91,8 +92,8 @@ class Record(Fields, Drawn):
 class Scores(Fields, Drawn):
     """How right, and how honest, a set of records is: `records`, `right`, `accuracy` with its 95 %
     interval `accuracy_interval` [2] (Wilson), `log_loss` in nats, `calibration_error`, and `reliability`,
-    ten bins of confidence, which plot() draws as accuracy over confidence. docs/files.md explains them with
-    the JSON of `palpate evaluate`."""
+    ten bins of confidence. docs/files.md explains them with the JSON of `palpate evaluate`. plot(ax=None) draws
+    accuracy over confidence with Matplotlib, and returns the axes."""
 
     def __repr__(self) -> str:
         return f"Scores({self['right']} of {self['records']} right, log_loss {self['log_loss']:.3f} nats)"
@@ -108,7 +109,8 @@ class Evaluation(Fields, Drawn):
     {"records", "median"}; how many records were left out: `without_truth` and `failed`. The right answer
     of a class that no map has is "(none)". docs/files.md explains all keys.
 
-    plot() draws which classes are taken for which, and `all.plot()` how far confidence can be trusted.
+    plot(ax=None) draws with Matplotlib which classes are taken for which, and returns the axes; `all.plot()`
+    draws how far confidence can be trusted.
     """
 
     _kinds = {"known_classes": Scores}

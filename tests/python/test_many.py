@@ -13,7 +13,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from conftest import Files, Maps, command, comparable, error_of, run
+from conftest import Files, command, comparable, error_of, run
 
 import palpate
 from palpate import many
