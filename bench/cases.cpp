@@ -145,7 +145,7 @@ Case fine_map_case(const Inputs& inputs) {
                     {"cells", cells},
                     {"repeats", repeats}},
           .measurements = {{"all maps", seconds, "s", at_most(goal_fine_seconds)},
-                           {"largest error", errors.largest(), "nats", at_most(goal_map_nats)},
+                           {"largest error", errors.largest, "nats", at_most(goal_map_nats)},
                            {"RMS error", errors.rms(), "nats"}}};
 }
 
@@ -191,7 +191,7 @@ Case map_stream_case(const Inputs& inputs, bool one_spot) {
                     {"cells", map.log_odds.size()}},
           .measurements = {{"per touch", 1e6 * seconds / (batch * batches), "us"},
                            {"peak memory's growth", growth / (1 << 20), "MiB"},
-                           {"largest relative error", relative.largest(), "of the log odds"}}};
+                           {"largest relative error", relative.largest, "of the log odds"}}};
 }
 
 Case many_unknowns_case(const Inputs& inputs) {
@@ -262,8 +262,7 @@ Case many_unknowns_case(const Inputs& inputs) {
     return result;
   }
   const auto [each, batch] = command_seconds(inputs, program);
-  result.measurements.insert(
-      result.measurements.end(),
+  result.add(
       {{"a process per unknown", 1.0 / each, "unknowns per s"},
        {"rate over a process per unknown", each * unknowns / seconds, "times",
         at_least(goal_rate_over_processes)},

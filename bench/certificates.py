@@ -109,5 +109,6 @@ def check_certificate(bounded: palpate.BoundedPosterior, dense: DensePosterior) 
         "promised": promised,
         "measured": measured,
         "holds": bool(holds) and measured <= promised + SUMMING_ERROR,
+        "bins_evaluated": certificate.bins_evaluated,
         "same_mode": same or abs(mode.log_likelihood - dense.mode[2]) <= SUMMING_ERROR,
     }

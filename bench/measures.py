@@ -138,7 +138,7 @@ def normalised_error(
     turn_rad -= wrapped(turn_rad, 2.0 * math.pi / grid.symmetry)
     about = centroid_mm - turning(turn_rad) @ centroid_mm
     error = pose - palpate.compose([*about, turn_rad], true)
-    error[2] = wrapped(error[2], 2.0 * math.pi)
+    error[2] = wrapped(error[2])
     return float(error @ numpy.linalg.solve(covariance, error))
 
 
@@ -149,7 +149,7 @@ def densities(modes: Sequence[Json], label: str, poses: Floats) -> Floats:
         if mode["object"] != label:
             continue
         d = poses - mode["T_robot_object"]
-        d[:, 2] = wrapped(d[:, 2], 2.0 * math.pi)
+        d[:, 2] = wrapped(d[:, 2])
         covariance = numpy.array(mode["covariance"])
         squared = numpy.einsum("ni,ij,nj->n", d, numpy.linalg.inv(covariance), d)
         height = mode["probability"] / math.sqrt((2.0 * math.pi) ** 3 * numpy.linalg.det(covariance))
@@ -181,7 +181,7 @@ def turning(angle_rad: float) -> NDArray[numpy.float64]:
     return numpy.array([[c, -s], [s, c]])
 
 
-def wrapped(angles_rad: Any, period_rad: float) -> Any:
+def wrapped(angles_rad: Any, period_rad: float = 2.0 * math.pi) -> Any:
     """Angles in [-period/2, period/2)."""
     return (angles_rad + period_rad / 2.0) % period_rad - period_rad / 2.0
 

@@ -4,41 +4,17 @@ import argparse
 import math
 import time
 from collections.abc import Sequence
+from functools import partial
 
 import palpate
 from palpate import _charts as charts
-from palpate._sweep_runs import counts_of
-from palpate._tables import (
-    Column,
-    Table,
-    count_text,
-    difference_text,
-    mean_text,
-    number,
-    plain,
-    print_table,
-    seconds_text,
-)
+from palpate._tables import Column, Table, count_text, mean_text, number, plain, seconds_text
 
 from .measures import differences, knee_of
 from .program import Json, begin, main, parser, write
 from .sweep_charts import charts_of
-from .sweep_runs import (
-    first_each,
-    measure_bounds,
-    measure_histogram,
-    measure_limits,
-    measure_particles,
-)
-from .trials import (
-    TABLE_1,
-    VOWELS,
-    Bins,
-    lattice_of,
-    letter_maps,
-    make_trials,
-    training_recordings,
-)
+from .sweep_runs import first_each, measure_bounds, measure_histogram, measure_limits, measure_particles
+from .trials import TABLE_1, VOWELS, Bins, lattice_of, letter_maps, make_trials, training_recordings
 
 SEED = 1_000  # the experiment's
 TOUCHES = 15
@@ -50,6 +26,7 @@ _MIB = number(".1f", 1.0 / (1 << 20))
 _MM = number(".3f")
 _NATS = number(".1e")
 _PERCENT = number(".0f", 100.0)
+_DIFFERENCE = partial(mean_text, sign="+")
 
 RUNS: list[Column] = [
     ("filter", "filter", plain),
@@ -97,8 +74,8 @@ LIMITS: list[Column] = [
     ("mode: mean error, mm", "error_mm", mean_text),
     ("refined: mean error, mm", "refined_error_mm", mean_text),
     ("compared with", "against", plain),
-    ("mode: difference, mm", "difference_mm", difference_text),
-    ("refined: difference, mm", "refined_difference_mm", difference_text),
+    ("mode: difference, mm", "difference_mm", _DIFFERENCE),
+    ("refined: difference, mm", "refined_difference_mm", _DIFFERENCE),
 ]
 
 
@@ -111,11 +88,11 @@ STEPS: list[Column] = [
     ("map cells, mm", "cell_mm", plain),
     ("from bins", "from", count_text),
     ("to bins", "to", count_text),
-    ("trials", "trials", plain),
+    ("trials", "error_mm/trials", plain),
     ("mode: mean error, mm", "error_mm", _step_text),
-    ("difference, mm", "error_mm", difference_text),
+    ("difference, mm", "error_mm", _DIFFERENCE),
     ("refined: mean error, mm", "refined_error_mm", _step_text),
-    ("difference, mm", "refined_error_mm", difference_text),
+    ("difference, mm", "refined_error_mm", _DIFFERENCE),
 ]
 VERDICTS: list[Column] = [
     ("goal", "name", plain),
@@ -140,13 +117,11 @@ def knee_record(points: Sequence[Json], cell_mm: float, fine: Bins) -> Json:
     bins, over the trials that both locate.
     """
     runs = [point for point in points if point["balanced"] and point["cell_mm"] == cell_mm]
-    knees = {}
-    for name in ("errors_mm", "refined_errors_mm"):
-        knee = knee_of([run[name] for run in runs])
-        knees[name] = None if knee is None else runs[knee]["count"]
+    finest, fine_count = runs[-1], math.prod(fine)
+    mode, refined = (knee_of([run[name] for run in runs]) for name in ("errors_mm", "refined_errors_mm"))
 
-    def text(count: int | None) -> str:
-        return f"at least {count_text(runs[-1]['count'])}" if count is None else count_text(count)
+    def text(knee: int | None) -> str:
+        return f"at least {count_text(finest['count'])}" if knee is None else count_text(runs[knee]["count"])
 
     steps = []
     for to in runs:
@@ -154,18 +129,16 @@ def knee_record(points: Sequence[Json], cell_mm: float, fine: Bins) -> Json:
             step: Json = {"cell_mm": cell_mm, "from": coarser["count"], "to": to["count"]}
             for name in ("error", "refined_error"):
                 step[f"{name}_mm"] = differences(to[f"{name}s_mm"], coarser[f"{name}s_mm"])
-            step["trials"] = step["error_mm"] and step["error_mm"]["trials"]
             steps.append(step)
     return {
         "cell_mm": cell_mm,
         "balanced_bins": list(fine),
-        "balanced_count": math.prod(fine),
-        "mode_knee": knees["errors_mm"],
-        "refined_knee": knees["refined_errors_mm"],
-        "floor_mm": runs[-1]["refined_error_mm"],
-        "sentence": f"Maps with cells of {cell_mm:g} mm need {text(knees['errors_mm'])} bins for the mode "
-        f"and {text(knees['refined_errors_mm'])} for the refined pose; --bins fine takes {plain(fine)} = "
-        f"{count_text(math.prod(fine))}.",
+        "balanced_count": fine_count,
+        "mode_knee": None if mode is None else runs[mode]["count"],
+        "refined_knee": None if refined is None else runs[refined]["count"],
+        "floor_mm": finest["refined_error_mm"],
+        "sentence": f"Maps with cells of {cell_mm:g} mm need {text(mode)} bins for the mode and "
+        f"{text(refined)} for the refined pose; --bins fine takes {plain(fine)} = {count_text(fine_count)}.",
         "steps": steps,
     }
 
@@ -173,12 +146,13 @@ def knee_record(points: Sequence[Json], cell_mm: float, fine: Bins) -> Json:
 def bounds_sentence(points: Sequence[Json]) -> str:
     """How well bounds agree with the histogram."""
     compared = [point["by_bounds"] for point in points if point["by_bounds"]]
-    trials = sum(of["compared_trials"] for of in compared)
-    mode_mm = max((of["mode_difference_mm"] for of in compared), default=0.0)
-    refined_mm = max((of["refined_difference_mm"] for of in compared), default=0.0)
+    mode_mm, refined_mm = (
+        max((of[f"{kind}_difference_mm"] for of in compared), default=0.0) for kind in ("mode", "refined")
+    )
     return (
-        f"Of {trials} trials with the full posterior on the same lattices, modes lie within "
-        f"{mode_mm:.1e} mm of those by bounds, and refined poses within {refined_mm:.1e} mm."
+        f"Of {sum(of['compared_trials'] for of in compared)} trials with the full posterior on the same "
+        f"lattices, modes lie within {mode_mm:.1e} mm of those by bounds, and refined poses within "
+        f"{refined_mm:.1e} mm."
     )
 
 
@@ -235,17 +209,17 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> Json:
             some = first_each(trials, 1 if quick or math.prod(bins) > 1_200_000 else 4)
             bounds.append(measure_bounds(device, maps, some, bins))
         fine = palpate.balanced_lattice(lattice_of(GOAL_BINS), maps, "fine")
-        knees.append(knee_record(points, cell_mm, counts_of(fine)))
-    print_table(BOUNDS, bounds)
+        knees.append(knee_record(points, cell_mm, fine.shape[::-1]))
+    Table(BOUNDS, bounds)
     lattices = [scaled(1e4)] if quick else [GOAL_BINS, scaled(3e5), scaled(3e6)]
     each = min(len(trials) // len(VOWELS), 2 if quick else len(trials))
     limits = measure_limits(device, quick, lattices, each, TOUCHES, SEED)
-    print_table(LIMITS, limits)
+    Table(LIMITS, limits)
     print("", *(f"- {knee['sentence']}" for knee in knees), sep="\n")
-    print_table(STEPS, [step for knee in knees for step in knee["steps"]])
+    Table(STEPS, [step for knee in knees for step in knee["steps"]])
     agreement, verdicts = bounds_sentence(points), verdicts_of(points)
     print(f"\n{agreement}")
-    print_table(VERDICTS, verdicts)
+    Table(VERDICTS, verdicts)
     return {
         "touches": TOUCHES,
         "trials": len(trials),

@@ -8,7 +8,7 @@ import numpy
 import pytest
 from conftest import Program, expect_refused, run
 
-from bench.experiment import ranges_of, standing
+from bench.experiment import standing
 
 TRIALS, TOUCHES = 10, 9
 
@@ -82,6 +82,5 @@ def test_what_cannot_be_is_refused(tmp_path: pathlib.Path) -> None:
 
 
 def test_standings_name_the_touches() -> None:
-    assert ranges_of([1, 2, 3, 5, 8, 9]) == "1-3, 5, 8-9"
-    leads = numpy.array([2.0, 0.0, -1.0, numpy.nan])
-    assert standing(leads) == "ahead at touch 1; tied at touch 2; behind at touch 3"
+    standings = "ahead from touch 1; tied from touch 3; behind from touch 4; unknown from touch 5"
+    assert standing(numpy.array([2.0, 1.0, 0.0, -1.0, numpy.nan])) == standings
