@@ -154,11 +154,9 @@ def measure_presses(device: palpate.Device, folder: str, quick: bool) -> Json:
         return share_record(sum(those), len(those))
 
     record: Json = {
-        "bins": lattice.shape[::-1],
         "bins_in_all": lattice.bins * len(maps),
         "objects": len(maps),
         "frames": len(answers),
-        "host_bytes": bounded.host_bytes,
         "median_s": median_low(seconds),
         "least_s": min(seconds),
         "most_s": max(seconds),

@@ -5,8 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "palpate/error.hpp"
-
 namespace palpate::bench {
 
 namespace {
@@ -95,9 +93,6 @@ std::vector<Recording> unknown_recordings(int count, int touches, std::uint64_t 
 }
 
 std::vector<Recording> glyph_recordings(int count) {
-  if (count < 1 || count > most_glyphs) {
-    throw Error(Fault::input, fmt::format("objects = {}: give 1 to {}", count, most_glyphs));
-  }
   std::vector<Recording> recordings;
   for (int i = 0; i < count; ++i) {
     recordings.push_back(glyph_simulator(i, recordings.size() + 1).touch(training_grid(), Pose{}));

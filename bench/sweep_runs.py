@@ -16,23 +16,8 @@ from palpate._tables import column, count_text
 from .certificates import check_certificate, dense_posterior
 from .measures import calibration, differences, wrapped
 from .program import Json
-from .trials import (
-    EXACT,
-    TABLE_1,
-    VOWELS,
-    Bins,
-    Body,
-    Floats,
-    Touching,
-    error_of,
-    lattice_of,
-    letter_maps,
-    make_trials,
-    map_of,
-    recognized,
-    training_recordings,
-    truth_of,
-)
+from .trials import EXACT, TABLE_1, VOWELS, Bins, Body, Floats, Touching, error_of, lattice_of, letter_maps
+from .trials import make_trials, map_of, recognized, training_recordings, truth_of
 
 Maps = Sequence[palpate.OccupancyGrid]
 Trials = Sequence[palpate.Recording]
@@ -254,9 +239,7 @@ def measure_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bin
     }
     in_all, evaluated = lattice.bins * len(maps), quantile(column(checks, "bins_evaluated"), 0.5)
     return {
-        "cell_mm": maps[0].cell_mm,
         "count": lattice.bins,
-        "bins": list(bins),
         "bins_in_all": in_all,
         "trials": len(trials),
         **times,

@@ -133,7 +133,7 @@ def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
 
     All by the histogram where bounds have no room for what the options ask, or objects slip.
     """
-    unknowns, in_all = sum(count for _, count in data.entries), lattice.bins * len(data.maps)
+    unknowns = sum(count for _, count in data.entries)
     point: Document = dict.fromkeys(("seconds_histogram", "seconds_bounds", "device_bytes", "host_bytes"))
     records: list[Record] = []
     try:
@@ -142,7 +142,7 @@ def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
     except Error:
         by_bounds = False
     # Half of the device's memory, as --bins auto has it.
-    room = in_all <= min(_MOST_HISTOGRAM, data.device.memory_bytes // 16)
+    room = lattice.bins * len(data.maps) <= min(_MOST_HISTOGRAM, data.device.memory_bytes // 16)
     dense = (min(dense, unknowns) if room else 0) if by_bounds else unknowns
     if dense:
         histogram = data.on(lattice, "histogram")
@@ -157,11 +157,9 @@ def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
     point |= {
         "count": lattice.bins,
         "bins": list(lattice.shape[::-1]),
-        "bins_in_all": in_all,
         "step_mm": max(lattice.x_mm.step, lattice.y_mm.step),
         "recordings": unknowns,
         "histogram_recordings": dense,
-        "labelled": len(known),
         "accuracy": sum(known) / len(known) if known else None,
         "sd_mm": median_low([math.hypot(x, y) for x, y, _ in sd]) if sd else None,
         "sd_deg": median_low([math.degrees(theta) for _, _, theta in sd]) if sd else None,

@@ -8,8 +8,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/error.hpp"
-
 namespace palpate::bench::letters_test {
 
 double pressed(const Recording& recording) {
@@ -57,11 +55,6 @@ TEST(GlyphScene, UnknownsLieAnywhereInTheRegion) {
     }
   }
   EXPECT_GT(farthest_mm, 0.8 * extent_mm);
-}
-
-TEST(GlyphScene, RefusesMoreObjectsThanThereAre) {
-  EXPECT_THROW(glyph_recordings(0), Error);
-  EXPECT_THROW(glyph_recordings(most_glyphs + 1), Error);
 }
 
 }  // namespace palpate::bench::letters_test

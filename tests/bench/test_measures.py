@@ -10,7 +10,7 @@ import palpate
 from bench.certificates import log_sum_exp
 from bench.measures import bootstrap_record, calibration, differences, gains, knee_of, normalised_error
 from bench.measures import share_record, student_record, told_apart, with_interval
-from bench.sweep_charts import front_of
+from bench.sweep import front_of
 from bench.sweep_runs import by_bounds, comparison_of, follow, nearest_bin_mm
 from bench.trials import Body, Touching, lattice_of, letter_maps, make_trials, map_of, truth_of
 from palpate._palpate import Random, Stream
