@@ -82,16 +82,12 @@ def check_certificate(bounded: palpate.BoundedPosterior, dense: DensePosterior) 
     estimate = bounded.estimate()
     mode, certificate = estimate.mode, estimate.certificate
     assert certificate is not None
-    evidence_low, evidence_high = numpy.array(certificate.log_evidence).T
-    low, high = numpy.array(estimate.identity_bounds).T
-    holds = numpy.all(
-        (evidence_low - SUMMING_ERROR <= dense.log_evidence)
-        & (dense.log_evidence <= evidence_high + SUMMING_ERROR)
-        & (low - SUMMING_ERROR <= dense.identity)
-        & (dense.identity <= high + SUMMING_ERROR)
-    )
-    marginals = [bounded.marginals(i) for i in range(len(low))]
-    counted, total = log_sum_exp(evidence_low), log_sum_exp(dense.log_evidence)
+    low, high = numpy.concatenate([certificate.log_evidence, estimate.identity_bounds]).T
+    exact = numpy.concatenate([dense.log_evidence, dense.identity])
+    holds = numpy.all((low - SUMMING_ERROR <= exact) & (exact <= high + SUMMING_ERROR))
+    objects = len(dense.identity)
+    marginals = [bounded.marginals(i) for i in range(objects)]
+    counted, total = log_sum_exp(low[:objects]), log_sum_exp(dense.log_evidence)
     errors = {
         "mass_outside": max(0.0, -math.expm1(counted - total)),
         "total_variation": max(
