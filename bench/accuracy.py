@@ -221,9 +221,7 @@ def row_of(
             "strangers_unfit": share(of_strangers["unfit"]),
             "strangers_called_none": share(of_strangers["none"]),
             "told_apart_by_z": told_apart(present(of_strangers["z"]), z),
-            "told_apart_by_none": told_apart(
-                values(known, "none_log_odds"), of_strangers["none_log_odds"]
-            ),
+            "told_apart_by_none": told_apart(values(known, "none_log_odds"), of_strangers["none_log_odds"]),
         }
     return row
 
@@ -246,8 +244,9 @@ def program() -> None:
         trials="unknowns of each object, and strangers [each scenario's own]",
     )
     flags.add_argument(
-        "scenarios", nargs="*", type=scenario_name, metavar="SCENARIO", help="measure only this or these [all]"
-    )
+        "scenarios", nargs="*", type=scenario_name, metavar="SCENARIO",
+        help="measure only this or these [all]",
+    )  # fmt: skip
     flags.add_argument(
         "--sets", type=at_least_1, default=1, metavar="N",
         help="training sets, each with unknowns of its own [%(default)s]",

@@ -248,9 +248,7 @@ def program() -> None:
     )
     flags.add_argument("--part", choices=("accuracy", "presses"), help="measure only this part")
     flags.add_argument("--presses", metavar="FOLDER", help="recordings of everyday objects")
-    flags.add_argument(
-        "--times", metavar="FILE", help="results of build/palpate-bench bounded --json FILE"
-    )
+    flags.add_argument("--times", metavar="FILE", help="results of build/palpate-bench bounded --json FILE")
     options = flags.parse_args()
     if options.part == "presses" and not options.presses:
         flags.error("--part presses: give the folder of recordings by --presses FOLDER")

@@ -56,9 +56,7 @@ def dense_posterior(
         below = numpy.cumsum(numpy.exp(flat[rising] - flat.max()))
         for bin_ in rising[below > _NEGLIGIBLE].tolist():
             pose = lattice.T_object_robot(bin_)
-            flat[bin_] = math.fsum(
-                reference.log_likelihood(touch, pose, grid, contact) for touch in touches
-            )
+            flat[bin_] = math.fsum(reference.log_likelihood(touch, pose, grid, contact) for touch in touches)
         bins.append(logs)
     evidence = numpy.array([log_weight + log_sum_exp(logs) for logs in bins])
     total = log_sum_exp(evidence)

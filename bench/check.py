@@ -110,9 +110,7 @@ class Set:
         """The same anywhere within 60 mm and at any angle."""
         part, way, turn = self.random.uniforms(3)
         far, way = FAR_MM * math.sqrt(part), 2 * math.pi * way
-        return self.mounted(
-            numpy.array([far * math.cos(way), far * math.sin(way), math.pi * (2 * turn - 1)])
-        )
+        return self.mounted(numpy.array([far * math.cos(way), far * math.sin(way), math.pi * (2 * turn - 1)]))
 
     def mounted(self, offset: Floats) -> tuple[Floats, Touches]:
         back = palpate.inverse(offset)
@@ -212,7 +210,8 @@ def program() -> None:
         "check",
         "Checks set-ups by sixty touches of each of three objects, in an hour and a half on a CPU core: "
         "sound ones, with the elements in another order, with the array elsewhere in the tool, near or "
-        "far, with faults that no set-up explains, and touched at one angle; with arrays of 36 and 64 elements, or of 36 with --quick.",
+        "far, with faults that no set-up explains, and touched at one angle; with arrays of 36 and 64 "
+        "elements, or of 36 with --quick.",
         trials="sets [100, or 2 with --quick]",
     )
     options = flags.parse_args()
@@ -226,9 +225,7 @@ def program() -> None:
             pathlib.Path(shapes[-1]).write_text(text)
         table = Table(COLUMNS)
         for elements, elements_mm in list(ARRAYS.items())[: 1 if options.quick else None]:
-            records = [
-                checked(device, Set(shapes, elements_mm, SEED + 1000 * k)) for k in range(sets)
-            ]
+            records = [checked(device, Set(shapes, elements_mm, SEED + 1000 * k)) for k in range(sets)]
             all_of[str(elements)] = records
             table.append(summary(elements, records))
     write(options.json, facts | {"check": table, "sets": all_of})

@@ -153,14 +153,19 @@ def learn_sensor(
         drawn = presses[k].grid(f"learned {k}", settings.spread_mm)
         grids.append(
             palpate.OccupancyGrid(
-                drawn.label, drawn.log_odds, cell_mm=drawn.cell_mm, origin_mm=drawn.origin_mm, prior=drawn.prior
-            )
+                drawn.label,
+                drawn.log_odds,
+                cell_mm=drawn.cell_mm,
+                origin_mm=drawn.origin_mm,
+                prior=drawn.prior,
+            )  # fmt: skip
         )
         windows = presses[k].windows(random, each)
         touches.append(touched(presses[k], windows, registration, label=drawn.label))
     calibration = palpate.calibrate(
-        touches, maps=grids, layer="log_odds", levels=settings.levels, device=device, **(near if quick else {})
-    )
+        touches, maps=grids, layer="log_odds", levels=settings.levels, device=device,
+        **(near if quick else {}),
+    )  # fmt: skip
     calibration.sensor.save(path)
     lines = [line for line in path.read_text().splitlines() if not line.startswith("pose_scale:")]
     path.write_text("\n".join(lines) + "\n")

@@ -193,9 +193,7 @@ def draw_accuracy(runs: list[Json]) -> Axes:
     axes = charts.chart("touches", "trials with the right letter, and 95 % interval (%)")
     for run in runs:
         colour = plot(axes, run, "accuracy", run["name"], 100.0)
-        touches, low, high = (
-            column(run["curve"], of) for of in ("touches", "accuracy_low", "accuracy_high")
-        )
+        touches, low, high = (column(run["curve"], of) for of in ("touches", "accuracy_low", "accuracy_high"))
         axes.fill_between(touches, 100.0 * low, 100.0 * high, color=colour, alpha=0.12, linewidth=0)
     axes.set_ylim(0.0, 105.0)
     return axes

@@ -126,9 +126,7 @@ def normalised_error(
     pose, true = numpy.asarray(estimate), numpy.asarray(truth)
     centroid_mm = Body.of(grid).centroid_mm
     if grid.symmetry == 0:
-        here, there = (
-            palpate.transform(palpate.inverse(of), [centroid_mm])[0] for of in (pose, true)
-        )
+        here, there = (palpate.transform(palpate.inverse(of), [centroid_mm])[0] for of in (pose, true))
         turn = turning(-pose[2])
         x, y = centroid_mm - pose[:2]
         jacobian = numpy.column_stack([-turn, turn @ (y, -x)])

@@ -33,9 +33,9 @@ COLUMNS: list[Column] = [
 def together(records: Sequence[Json]) -> dict[str, float]:
     """What presses of one object say of its label: each lies at a pose of its own."""
     labels = list(records[0]["identity"])
-    logs = numpy.log(
-        [[max(record["identity"][label], LEAST) for label in labels] for record in records]
-    ).sum(axis=0)
+    logs = numpy.log([[max(record["identity"][label], LEAST) for label in labels] for record in records]).sum(
+        axis=0
+    )
     p = numpy.exp(logs - logs.max())
     return dict(zip(labels, (p / p.sum()).tolist(), strict=True))
 

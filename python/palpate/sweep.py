@@ -175,9 +175,7 @@ def _advice(
         for name, by in (("seconds_histogram", "the histogram"), ("seconds_bounds", "bounds"))
         if advised.point[name] is not None
     ]
-    auto_takes, fine_takes = (
-        f"{plain(of.shape[::-1])} = {count_text(of.bins)}" for of in (automatic, fine)
-    )
+    auto_takes, fine_takes = (f"{plain(of.shape[::-1])} = {count_text(of.bins)}" for of in (automatic, fine))
     return (
         f"{words}\nAn unknown then costs {' and '.join(costs)}. --bins auto takes {auto_takes}, and "
         f"--bins fine {fine_takes}."

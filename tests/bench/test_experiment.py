@@ -76,7 +76,6 @@ def test_what_cannot_be_is_refused(tmp_path: pathlib.Path) -> None:
     assert none.status == 2 and "give 1 or more" in none.err
     expect_refused(run("bench.experiment", "--touches", 193), "give 1 to 192")
     wrong = ["--json", str(tmp_path / "missing" / "file")]
-    expect_refused(run("bench.experiment", *wrong), "cannot be written")
     started = subprocess.run([sys.executable, "-m", "bench.experiment", *wrong], capture_output=True, text=True)
     assert started.returncode == 2 and "cannot be written" in started.stderr, "as a user starts it"
 
