@@ -10,6 +10,7 @@ import numpy
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 import palpate
 from palpate import _charts as charts
@@ -41,7 +42,7 @@ RUNS: list[Column] = [
     ("trials", "trials", plain),
     ("touches", "last/touches", plain),
     ("time, s", "seconds", number(".1f")),
-    ("right at the end, %", "right", with_interval(".1f", 100.0)),
+    ("right at the end, %", "last/right", with_interval(".1f", 100.0)),
     ("all right from touch", "all_right_from", plain),
     ("mean error, mm", "last/error_mm/mean", _MM),
     ("median", "last/error_mm/median", _MM),
@@ -70,11 +71,12 @@ def run_filter(
     trials: Sequence[palpate.Recording],
     kind: str,
     size: Bins | int,
+    off_by: str,
 ) -> Json:
     """One filter over the trials: so many bins of a histogram, or particles, or of "augmented" MCL.
 
     Each trial has particles of a seed of its own, from 1 on. `count` is of bins per object or of
-    particles in all, `steps` is what recognized() gives.
+    particles in all, `steps` is what recognized() gives. off_by: how far the array is off.
     """
     start = time.perf_counter()
     if isinstance(size, tuple):
@@ -85,12 +87,19 @@ def run_filter(
             recognized(device, maps, [trial], seed=seed, **options)[0]
             for seed, trial in enumerate(trials, start=1)
         ]
+    curve = [point_of(touch, of) for touch, of in enumerate(zip(*steps, strict=True), 1)]
+    less = column(curve, "refined_error_mm/mean") < column(curve, "error_mm/mean")
     return {
         "filter": kind,
         "name": f"{'augmented MCL' if kind == 'augmented' else kind} {plain(size)}",
         "count": int(numpy.prod(size)),
+        "off_by": off_by,
+        "trials": len(trials),
         "seconds": time.perf_counter() - start,
-        "curve": [point_of(touch, of) for touch, of in enumerate(zip(*steps, strict=True), 1)],
+        "curve": curve,
+        "last": curve[-1],
+        "all_right_from": from_touch(column(curve, "accuracy") == 1.0),
+        "refined_less_from": from_touch(less),
         "calibration": calibration(column(steps, "confidence").ravel(), column(steps, "right").ravel()),
         "steps": steps,
     }
@@ -102,6 +111,7 @@ def point_of(touches: int, steps: Sequence[Json]) -> Json:
     errors = errors_over(column(steps, "error_mm"))
     return {
         "touches": touches,
+        "right": right,
         "accuracy": right["mean"],
         "accuracy_low": right["low"],
         "accuracy_high": right["high"],
@@ -112,24 +122,10 @@ def point_of(touches: int, steps: Sequence[Json]) -> Json:
     }
 
 
-def row_of(run: Json, off_by: str) -> Json:
-    """A run's row of RUNS."""
-    curve, last = run["curve"], run["curve"][-1]
-
-    def from_touch(holds: Any) -> int | None:
-        """From which touch on something holds to the end, where it does at the end."""
-        touch = 1 + int(numpy.append(0, numpy.flatnonzero(~holds) + 1)[-1])
-        return touch if touch <= len(curve) else None
-
-    less = column(curve, "refined_error_mm/mean") < column(curve, "error_mm/mean")
-    return run | {
-        "off_by": off_by,
-        "trials": len(run["steps"]),
-        "last": last,
-        "right": {"mean": last["accuracy"], "low": last["accuracy_low"], "high": last["accuracy_high"]},
-        "all_right_from": from_touch(column(curve, "accuracy") == 1.0),
-        "refined_less_from": from_touch(less),
-    }
+def from_touch(holds: NDArray[numpy.bool_]) -> int | None:
+    """From which touch on something holds to the end, where it does at the end."""
+    touch = 1 + int(numpy.append(0, numpy.flatnonzero(~holds) + 1)[-1])
+    return touch if touch <= len(holds) else None
 
 
 def standing(leads: Floats) -> str:
@@ -139,7 +135,7 @@ def standing(leads: Floats) -> str:
     return "; ".join(f"{word} from touch {next(span)[0]}" for word, span in spans)
 
 
-def comparisons_of(runs: Sequence[Json], off_by: str) -> list[Json]:
+def comparisons_of(runs: Sequence[Json]) -> list[Json]:
     """Each histogram against each particle filter of as many particles as it has bins per object.
 
     Trials that the histogram has right, minus those of the particles; and the particles' error minus the
@@ -163,7 +159,7 @@ def comparisons_of(runs: Sequence[Json], off_by: str) -> list[Json]:
             {
                 "histogram": histogram["name"],
                 "particles": particles["name"],
-                "off_by": off_by,
+                "off_by": particles["off_by"],
                 "identity": standing(ahead),
                 "right_lead": float(ahead.mean()),
                 "last_right_lead": float(ahead[-1]),
@@ -307,9 +303,9 @@ def measure(options: argparse.Namespace) -> None:
         trials = make_trials(VOWELS, each, limit, SEED, Touching(noise=(mm, rad)))
         runs = []
         for kind, size in kinds if undisplaced else of_noise:
-            runs.append(run_filter(device, maps, trials, kind, size))
-            table.append(row_of(runs[-1], off_by))
-        comparisons += comparisons_of(runs, off_by)
+            runs.append(run_filter(device, maps, trials, kind, size, off_by))
+            table.append(runs[-1])
+        comparisons += comparisons_of(runs)
         without = [{name: of for name, of in run.items() if name != "steps"} for run in runs]
         levels.append({"translation_mm": mm, "rotation_rad": rad, "filters": without})
     Table(COMPARISONS, comparisons)
