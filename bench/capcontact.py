@@ -14,7 +14,8 @@ from palpate import _charts as charts
 from palpate._statistics import present
 from palpate._tables import Column, Table, column, number, plain
 
-from .contact_array import AS_BUILT, RATIO, SPREAD_MM, THRESHOLD, Press, Registration, read_presses, touched
+from .contact_array import AS_BUILT, PIXEL_MM, RATIO, SPREAD_MM, THRESHOLD, Press, Registration
+from .contact_array import read_presses, touched
 from .contact_learning import Learned, Learning
 from .measures import level_in_modes, turning, wrapped
 from .program import Json, begin, main, parser, write
@@ -165,13 +166,19 @@ def draw_errors(scores: Json) -> Figure:
 
 
 def draw_press(beliefs: dict[str, tuple[Trial, Json]]) -> bytes:
-    """The readings of one window and of five where they lie, and the pose that is believed."""
+    """The readings of one window and of five where they lie, the true contact, and the belief."""
     figure = Figure(figsize=(11.4, 5.4))
     for windows, axes in zip(("1", "5"), figure.subplots(1, 2), strict=True):
         trial, step = beliefs[windows]
         trial.touches(AS_BUILT).plot(axes)
         palpate.Record(step).plot(axes)
-        axes.set_title(f"{windows} of 5 windows")
+        press = trial.press
+        pixels = numpy.argwhere(numpy.ones_like(press.contact))[:, ::-1]
+        places = palpate.transform(trial.T_robot_object, PIXEL_MM * pixels - press.centroid_mm)
+        x, y = places.T.reshape(2, *press.contact.shape)
+        axes.contour(x, y, press.contact, levels=[0.5], colors="black", linestyles="dashed")
+        axes.set(xlim=(-130, 130), ylim=(-130, 130))
+        axes.set_title(f"{windows} of 5 windows: readings, contact (dashed) and belief")
     return charts.image(figure, "png", dpi=100)
 
 
