@@ -21,11 +21,9 @@ namespace {
 
 constexpr const char* row = "| {:<28} | {:<46} | {:<28} | {:<8} | {:<7} |\n";
 
-/// Strings as they are, numbers in their shortest form.
+/// Strings without quotes, numbers in their shortest form.
 std::string plain_text(const Json& value) {
-  return value.is_string()         ? value.get<std::string>()
-         : value.is_number_float() ? fmt::format("{}", value.get<double>())
-                                   : value.dump();
+  return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
 /// A field of /proc/self/status, which are in KiB; 0 where there is none.
