@@ -10,7 +10,7 @@
 #include "io/input_file.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/virtual_sensor.hpp"
-#include "streaming/import_array.hpp"
+#include "streaming/import_steps.hpp"
 
 namespace palpate::cli {
 

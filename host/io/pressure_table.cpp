@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "io/column_choice.hpp"
@@ -18,16 +19,6 @@ namespace {
 
 constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double before_all = -std::numeric_limits<double>::infinity();
-
-std::optional<std::size_t> find_one_of(const CsvTable& table,
-                                       std::initializer_list<std::string_view> names) {
-  for (const std::string_view name : names) {
-    if (const auto found = table.find(name)) {
-      return found;
-    }
-  }
-  return {};
-}
 
 /// Returns a whole number, at least 0, in a cell of the row.
 std::uint64_t count_in(const CsvTable& table, std::size_t column, std::uint64_t limit,
@@ -159,9 +150,12 @@ double frame_in(const CsvTable& table, std::size_t column, double last) {
 /// pressures.
 std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
                                        const TableOptions& options) {
-  const auto element_column = find_one_of(table, {"element", "taxel"});
-  const auto pressure_column = find_one_of(table, {"pressure", "pressure_kpa", "value"});
-  const auto frame_column = find_one_of(table, {"frame", "touch"});
+  const auto find = [&](std::string_view names) {
+    return find_column(table, names, no_unit, options);
+  };
+  const auto element_column = find("element taxel");
+  const auto pressure_column = find("pressure pressure_kpa value");
+  const auto frame_column = find("frame touch");
   const auto time = find_time(table, options);
   if (!element_column || !pressure_column) {
     return {};
@@ -182,7 +176,8 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
   std::vector<bool> read(elements);
   TableTimes times(table, time.value_or(UnitColumn()));
   while (table.next()) {
-    const double key = time ? times.next(all.time_s.size()) : frame_in(table, *frame_column, last);
+    const double key =
+        time ? times.next(all.time_s.size()) : frame_in(table, frame_column->index, last);
     if (key != last) {
       all.pressure.insert(all.pressure.end(), elements, unknown_number);
       read.assign(elements, false);
@@ -191,14 +186,14 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
       }
       last = key;
     }
-    const auto element = count_in(table, *element_column, elements - 1, remedy.c_str());
+    const auto element = count_in(table, element_column->index, elements - 1, remedy.c_str());
     if (read[element]) {
       table.refuse("element {} has two readings {}; leave one out", element,
                    time ? "at one time" : "in one frame");
     }
     read[element] = true;
     all.pressure[all.pressure.size() - elements + element] =
-        table.number(*pressure_column).value_or(unknown_number);
+        table.number(pressure_column->index).value_or(unknown_number);
   }
   all.steps = std::move(times.steps);
   return all;

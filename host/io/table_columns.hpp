@@ -25,6 +25,7 @@ struct Unit {
   double convert(double number) const { return number * multiplier / divisor; }
 };
 
+inline constexpr std::array<Unit, 1> no_unit{{{""}}};
 // Units of the tables; the first of each list is the default.
 inline constexpr std::array<Unit, 4> time_units{
     {{"s"}, {"ms", 1.0, 1e3}, {"us", 1.0, 1e6}, {"ns", 1.0, 1e9}}};
@@ -100,8 +101,11 @@ enum class PoseForm { planar, quaternion, euler, rotation_vector, matrix };
 struct PoseColumns {
   PoseForm form = PoseForm::planar;
   std::vector<UnitColumn> columns;  ///< in the order of the form
-  bool are_usual = true;            ///< x, y, theta, or a quaternion: nothing needs to be said
 };
+
+/// The columns of these indices as a pose of this form. @throws Error as unit_column()
+PoseColumns pose_columns(const CsvTable& table, PoseForm form,
+                         const std::vector<std::size_t>& indices, const TableOptions& options);
 
 /// Finds the columns of poses that the options name, or else that have the usual names of one form;
 /// no columns where there are none.
@@ -115,12 +119,6 @@ struct ClockStep {
   double from_s = 0.0;
   double to_s = 0.0;
 };
-
-/// Seconds of a date and time by ISO 8601, such as 2026-11-29T12:41:27.5+01:00, since the Unix
-/// epoch (without an offset as of UTC), or of a time of day, such as 12:41:27,5, since midnight;
-/// none where the text is neither.
-/// @param of_day gets whether it is a time of day
-std::optional<double> clock_time_of(std::string_view text, bool& of_day);
 
 /// Reads the times of a table's rows, in numbers or as clocks write them.
 class TableTimes {

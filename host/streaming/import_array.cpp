@@ -1,4 +1,4 @@
-#include "streaming/import_array.hpp"
+#include "streaming/import_steps.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -31,6 +31,7 @@ LineSensor::LineSensor(SensorDescription description, PosedSensor::Warn warn, in
       warn_(std::move(warn)),
       sign_(sign),
       format_(description_.elements_mm.size()),
+      flaws_(warn_),
       reader_("frames", "-", 4096 + most_bytes_per_reading * description_.elements_mm.size(),
               [this](const LineReader::Line& line) { take(line); }) {}
 
@@ -128,16 +129,14 @@ void LineSensor::say_first(double now_s, double time_s) {
   }
   // Times since 1970 show their unit by their size, others by how far frames lie apart.
   const double step_s = (first_s_.back() - first_s_.front()) / static_cast<double>(enough - 1);
-  const char* unit = nullptr;
-  if (time_s > latest_s) {
-    unit = time_s > 1e17 ? "nanoseconds" : time_s > 1e14 ? "microseconds" : "milliseconds";
-  } else if (step_s >= 1.0) {
-    unit = step_s >= 1e6 ? "nanoseconds" : step_s >= 1e3 ? "microseconds" : "milliseconds";
-  }
-  if (unit != nullptr) {
+  if (time_s > latest_s || step_s >= 1.0) {
+    const double per_s = time_s > latest_s ? time_s / latest_s : step_s;
     warn_(fmt::format(
         "{}: its frames are {:.3g} s apart by their times, which look like {}; write seconds",
-        reader_.name(), step_s, unit));
+        reader_.name(), step_s,
+        per_s >= 1e6   ? "nanoseconds"
+        : per_s >= 1e3 ? "microseconds"
+                       : "milliseconds"));
   }
 }
 
@@ -154,16 +153,9 @@ void LineSensor::refuse_line(const LineReader::Line& line, FrameLines::Flaw::Kin
   if (counters_.frames == 0) {
     throw Error(Fault::input, text);
   }
-  ++refused_;
   ++lost_before_;
   ++counters_.lost;
-  if (first_refused_.empty()) {
-    first_refused_ = text;
-  }
-  if (warn_ && !told_[static_cast<std::size_t>(kind)]) {
-    warn_(text);
-  }
-  told_.set(static_cast<std::size_t>(kind));
+  flaws_.add(kind, text);
 }
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-#include "streaming/pose_join.hpp"
+#include "streaming/import_steps.hpp"
 
 #include <algorithm>
 #include <filesystem>

@@ -1,10 +1,8 @@
 #include <algorithm>
-#include <bitset>
 #include <chrono>
 #include <cstdint>
 #include <deque>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -29,9 +27,10 @@ class PoseReader {
   /// @param name path of a file or FIFO, or "-": standard input
   /// @param warn called for the first refused line of each kind; may be empty
   /// @throws Error where `name` cannot be read, or a line of a file is refused
-  PoseReader(const std::string& name, PoseTrack& track, PosedSensor::Warn warn)
+  PoseReader(const std::string& name, PoseTrack& track, const PosedSensor::Warn& warn)
       : track_(track),
-        warn_(std::move(warn)),
+        flaws_(warn ? PosedSensor::Warn([warn](const std::string& text) { warn("poses " + text); })
+                    : warn),
         lines_("poses", name, longest_line, [this](const LineReader::Line& line) { take(line); }) {
     while (is_file() && read_some()) {
     }
@@ -55,109 +54,78 @@ class PoseReader {
   std::uint64_t poses() const { return poses_ - track_.dropped() - track_.set_aside(); }
   /// Lines that were refused.
   std::uint64_t refused() const { return malformed_ + track_.dropped(); }
-  const std::string& first_refused() const { return first_refused_; }
+  const std::string& first_refused() const { return flaws_.first(); }
 
  private:
-  /// What may be wrong with a line.
-  enum class LineFlaw {
-    too_long,
-    no_pose,
-    no_number,
-    far_away,
-    out_of_order,
-    clock_set_back,
-    kinds
-  };
+  using Kind = FrameLines::Flaw::Kind;
 
   // Reads one block; false where there is none, or none yet.
   bool read_some() {
     const bool some = lines_.read_some();
     if (lines_.ended() && !std::exchange(ended_, true)) {
-      const std::uint64_t dropped = track_.dropped();
-      track_.end();
-      judge_order(dropped, track_.set_back());
+      judging_order([this] { track_.end(); });
     }
     return some;
   }
 
   void take(const LineReader::Line& line) {
-    line_ = line.number;
-    if (line.too_long) {
-      refuse_line(LineFlaw::too_long, line_, "is longer than any pose");
-      return;
-    }
-    const auto read = format_.read(line.text, 0.0);
+    const auto read = line.too_long ? FrameLines::Flaw{.words = "is longer than any pose"}
+                                    : format_.read(line.text, 0.0);
     if (const auto* flaw = std::get_if<FrameLines::Flaw>(&read)) {
-      using Kind = FrameLines::Flaw::Kind;
-      refuse_line(flaw->kind == Kind::malformed   ? LineFlaw::no_pose
-                  : flaw->kind == Kind::no_number ? LineFlaw::no_number
-                                                  : LineFlaw::far_away,
-                  line_, flaw->words);
+      ++malformed_;
+      flaws_.add(flaw->kind, words_about(line.number, flaw->words));
     } else if (const auto* frame = std::get_if<Frame>(&read)) {
-      add(frame->host_time_s, *frame->T_robot_sensor);
+      const double before_s = track_.last_s().value_or(frame->host_time_s);
+      ++poses_;
+      judging_order([&] { track_.add(frame->host_time_s, *frame->T_robot_sensor); });
+      if (track_.set_aside() == 1) {
+        aside_ = {.line = line.number, .time_s = frame->host_time_s, .before_s = before_s};
+      }
     }
   }
 
-  void add(double time_s, const Pose& T_robot_sensor) {
+  // Reports what the track does with the poses that it had set aside.
+  void judging_order(const auto& change_track) {
     const std::uint64_t dropped = track_.dropped();
     const std::uint64_t set_back = track_.set_back();
-    const double before_s = track_.last_s().value_or(time_s);
-    ++poses_;
-    track_.add(time_s, T_robot_sensor);
-    judge_order(dropped, set_back);
-    if (track_.set_aside() == 1) {
-      aside_ = {.line = line_, .time_s = time_s, .before_s = before_s};
+    change_track();
+    const auto& [line, time_s, before_s] = aside_;
+    if (track_.dropped() != dropped) {
+      flaws_.add(
+          Kind::out_of_order,
+          words_about(line, fmt::format("time = {} s is {} the poses around it, at {} s", time_s,
+                                        time_s <= before_s ? "not later than" : "far later than",
+                                        before_s)));
+    }
+    if (track_.set_back() != set_back) {  // those poses have joined the track
+      flaws_.say(
+          Kind::clock_set_back,
+          words_about(line, fmt::format("time = {} s is not later than the pose before, at {} s, "
+                                        "and the poses after it go on from there: the robot's "
+                                        "clock was set",
+                                        time_s, before_s)));
     }
   }
 
-  // Reports what the track did with the poses that it had set aside.
-  void judge_order(std::uint64_t dropped_before, std::uint64_t set_back_before) {
-    const bool early = aside_.time_s <= aside_.before_s;
-    if (track_.dropped() != dropped_before) {
-      refuse_line(LineFlaw::out_of_order, aside_.line,
-                  fmt::format("time = {} s is {} the poses around it, at {} s", aside_.time_s,
-                              early ? "not later than" : "far later than", aside_.before_s));
-    }
-    if (track_.set_back() != set_back_before) {
-      const std::string words = fmt::format(
-          "time = {} s is not later than the pose before, at {} s, and the poses after "
-          "it go on from there: the robot's clock was set",
-          aside_.time_s, aside_.before_s);
-      refuse_line(LineFlaw::clock_set_back, aside_.line, words);
-    }
-  }
-
-  void refuse_line(LineFlaw flaw, std::uint64_t line, std::string_view words) {
+  /// What is wrong with a line. @throws Error with these words where it stands in a file
+  std::string words_about(std::uint64_t line, const std::string& words) const {
     const std::string text = fmt::format(
         "{}, line {}: {}; write {{\"time\": s, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}}, "
-        "or CSV "
-        "with these columns",
+        "or CSV with these columns",
         lines_.name(), line, words);
     if (is_file()) {
       throw Error(Fault::input, text);
     }
-    malformed_ += flaw < LineFlaw::out_of_order ? 1 : 0;  // the track counts the others
-    if (first_refused_.empty() &&
-        flaw != LineFlaw::clock_set_back) {  // those poses have joined the track
-      first_refused_ = text;
-    }
-    const auto kind = static_cast<std::size_t>(flaw);
-    if (warn_ && !told_[kind]) {
-      warn_("poses " + text);
-    }
-    told_[kind] = true;
+    return text;
   }
 
   PoseTrack& track_;
-  PosedSensor::Warn warn_;
+  RefusedLines flaws_;
   FrameLines format_{0};
   LineReader lines_;
   bool ended_ = false;
-  std::uint64_t line_ = 0;       ///< the last line that was taken
   std::uint64_t poses_ = 0;      ///< lines handed to the track
   std::uint64_t malformed_ = 0;  ///< lines that hold no pose
-  std::string first_refused_;
-  std::bitset<static_cast<std::size_t>(LineFlaw::kinds)> told_;
 
   /// The first of the poses that the track has set aside.
   struct {

@@ -7,7 +7,7 @@
 
 #include <gmock/gmock.h>
 
-#include "streaming/import_array.hpp"
+#include "streaming/import_steps.hpp"
 #include "streaming/press_clock.hpp"
 #include "support/limits.hpp"
 
