@@ -1,4 +1,4 @@
-#include "io/column_choice.hpp"
+#include "io/table_columns.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,6 @@
 #include <optional>
 #include <utility>
 
-#include "io/column_choice.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "model/stream_time.hpp"

@@ -154,24 +154,6 @@ class RecordingFindings {
       say("One in a hundred readings is above {} kPa; are these pascals or raw readings?",
           most_kpa);
     }
-    look_for_saturation(unit);
-  }
-
-  /// A sensor that saturates reads its largest value again and again, and more often than any of
-  /// the values just below it.
-  void look_for_saturation(const std::string& unit) {
-    constexpr std::uint64_t least_times = 5;
-    constexpr std::uint64_t least_bins = 8;  // fewer: a switch, or noise of a few steps
-    constexpr double much = 4.0;
-    const double highest = p_.range->most;
-    const double near = highest - 0.25 * (highest - p_.readings.quantile(0.5));
-    const std::uint64_t bins = p_.readings.occupied(near, highest);
-    const auto others = static_cast<double>(p_.readings.count(near, highest) - p_.at_most);
-    if (p_.times_at_most >= least_times && bins >= least_bins &&
-        static_cast<double>(p_.at_most) > much * others / static_cast<double>(bins)) {
-      say("{} readings are exactly the largest, {:.4g} {}: the sensor saturates there.", p_.at_most,
-          highest, unit);
-    }
   }
 
   void look_at_elements() {

@@ -104,7 +104,7 @@ class Survey {
       }
       const std::vector<double>& baseline = head_.baseline;
       const double pressure = readings[element] - (baseline.empty() ? 0.0 : baseline[element]);
-      take_reading(row, element, readings[element], pressure);
+      take_reading(element, readings[element], pressure);
       if (!std::isnan(readings[element]) && (!strongest || pressure > *strongest)) {
         strongest = pressure;
         strongest_element = element;
@@ -118,7 +118,7 @@ class Survey {
     return true;
   }
 
-  void take_reading(std::uint64_t row, std::size_t of_element, double reading, double pressure) {
+  void take_reading(std::size_t of_element, double reading, double pressure) {
     PressureSurvey& all = result_.pressure;
     ElementSurvey& element = all.elements[of_element];
     ++element.alive;
@@ -132,19 +132,7 @@ class Survey {
     element.last = reading;
     element.contacts += result_.threshold && pressure > *result_.threshold ? 1 : 0;
     all.readings.add(reading);
-    if (!all.range || reading > all.range->most) {
-      all.at_most = 0;
-      all.times_at_most = 0;
-    }
     include(all.range, reading);
-    if (reading == all.range->most) {
-      const std::uint64_t apart = head_.rows == "frames" ? 2 : 1;
-      if (all.at_most == 0 || row >= last_at_most_ + apart) {
-        ++all.times_at_most;
-      }
-      ++all.at_most;
-      last_at_most_ = row;
-    }
   }
 
   void take_pose(const Pose& T_robot_sensor) {
@@ -194,7 +182,6 @@ class Survey {
   const Recording& head_ = file_.head().recording;
   std::size_t e_ = file_.head().elements;
   RecordingSurvey result_;
-  std::uint64_t last_at_most_ = 0;      ///< last row with the largest reading
   std::vector<std::uint64_t> touches_;  ///< digests of the touches in contact
   std::vector<glm::dvec2> places_mm_;   ///< of the living elements in the first row
   std::vector<std::size_t> placed_;     ///< their indices in the array
@@ -231,22 +218,6 @@ double ReadingHistogram::quantile(double part) const {
     }
   }
   return edge_of(counts_.size() - 1);
-}
-
-std::uint64_t ReadingHistogram::count(double low, double high) const {
-  std::uint64_t sum = 0;
-  for (std::size_t bin = bin_of(low); bin <= bin_of(high); ++bin) {
-    sum += counts_[bin];
-  }
-  return sum;
-}
-
-std::uint64_t ReadingHistogram::occupied(double low, double high) const {
-  std::uint64_t bins = 0;
-  for (std::size_t bin = bin_of(low); bin <= bin_of(high); ++bin) {
-    bins += counts_[bin] > 0 ? 1 : 0;
-  }
-  return bins;
 }
 
 RecordingSurvey survey_recording(const std::filesystem::path& path) { return Survey(path).run(); }

@@ -6,8 +6,6 @@
 
 #include <fmt/ranges.h>
 
-#include "io/column_choice.hpp"
-#include "io/spatial_pose.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 
@@ -168,6 +166,16 @@ PoseColumns named_pose(const CsvTable& table, const TableOptions& options) {
     form = is_vector ? PoseForm::rotation_vector : form;
   }
   return pose_columns(table, form, chosen, options);
+}
+
+/// True for three axes of x, y and z in lower case (fixed) or in upper case (moving), none of which
+/// follows itself.
+bool are_axes(std::string_view axes) {
+  const auto all_of = [&](std::string_view letters) {
+    return axes.find_first_not_of(letters) == axes.npos;
+  };
+  return axes.size() == 3 && (all_of("xyz") || all_of("XYZ")) && axes[0] != axes[1] &&
+         axes[1] != axes[2];
 }
 
 }  // namespace

@@ -33,7 +33,6 @@ class FrameSmoother {
     append(time_s, pressure);
     while (window_.size() > 1 &&
            (window_.size() > most_frames || window_.front().time_s <= time_s - smooth_s_)) {
-      spare_.push_back(std::move(window_.front().values));
       window_.pop_front();
     }
     take_means(time_s);
@@ -44,10 +43,7 @@ class FrameSmoother {
   const std::vector<double>& means() const { return mean_; }
   /// Forgets every frame.
   void reset() {
-    while (!window_.empty()) {
-      spare_.push_back(std::move(window_.front().values));
-      window_.pop_front();
-    }
+    window_.clear();
     recent_.clear();
   }
 
@@ -63,7 +59,6 @@ class FrameSmoother {
   struct Medians {
     double time_s;
     std::vector<double> values;  ///< [e] NaN: Unknown
-    bool whole;                  ///< no element is Unknown
   };
 
   // Bounds memory and work where times do not advance; more frames would hardly improve the mean.
@@ -76,16 +71,9 @@ class FrameSmoother {
   void append(double time_s, const std::vector<double>& pressure) {
     const std::size_t e = pressure.size();
     recent_.resize(e);
-    std::vector<double> middle;
-    if (!spare_.empty()) {
-      middle = std::move(spare_.back());
-      spare_.pop_back();
-    }
-    middle.assign(e, std::numeric_limits<double>::quiet_NaN());
-    bool whole = true;
+    std::vector<double> middle(e, std::numeric_limits<double>::quiet_NaN());
     for (std::size_t i = 0; i < e; ++i) {
       if (std::isnan(pressure[i])) {
-        whole = false;
         continue;
       }
       Recent& recent = recent_[i];
@@ -96,7 +84,7 @@ class FrameSmoother {
       recent.last_s = time_s;
       middle[i] = median(recent.readings[0], recent.readings[1], recent.readings[2]);
     }
-    window_.push_back({.time_s = time_s, .values = std::move(middle), .whole = whole});
+    window_.push_back({.time_s = time_s, .values = std::move(middle)});
   }
 
   // Sums anew for every frame: in a running sum, the rounding of a single reading of 1e20 would
@@ -106,25 +94,16 @@ class FrameSmoother {
     sum_.assign(e, 0.0);
     known_.assign(e, 0.0);
     mean_.resize(e, 0.0);
-    double whole = 0.0;
     for (const Medians& medians : window_) {
-      if (medians.whole) {
-        // Nearly all frames are whole; this loop takes a third of the other loop's time.
-        for (std::size_t i = 0; i < e; ++i) {
-          sum_[i] += medians.values[i];
-        }
-        whole += 1.0;
-      } else {
-        for (std::size_t i = 0; i < e; ++i) {
-          const bool known = !std::isnan(medians.values[i]);
-          sum_[i] += known ? medians.values[i] : 0.0;
-          known_[i] += known ? 1.0 : 0.0;
-        }
+      for (std::size_t i = 0; i < e; ++i) {
+        const bool known = !std::isnan(medians.values[i]);
+        sum_[i] += known ? medians.values[i] : 0.0;
+        known_[i] += known ? 1.0 : 0.0;
       }
     }
     for (std::size_t i = 0; i < e; ++i) {
-      if (const double known = whole + known_[i]; known > 0.0) {
-        mean_[i] = sum_[i] / known;
+      if (known_[i] > 0.0) {
+        mean_[i] = sum_[i] / known_[i];
       } else if (recent_[i].count == 0 || time_s - recent_[i].last_s > largest_gap_s_) {
         mean_[i] = 0.0;
       }
@@ -135,10 +114,9 @@ class FrameSmoother {
   double largest_gap_s_;
   std::vector<Recent> recent_;  ///< [e]
   std::deque<Medians> window_;
-  std::vector<std::vector<double>> spare_;  ///< memory for the next medians
-  std::vector<double> sum_;                 ///< [e] of the window
-  std::vector<double> known_;               ///< [e] known medians of frames that are not whole
-  std::vector<double> mean_;                ///< [e]
+  std::vector<double> sum_;    ///< [e] of the window
+  std::vector<double> known_;  ///< [e] its known medians
+  std::vector<double> mean_;   ///< [e]
 };
 
 }  // namespace palpate

@@ -264,16 +264,7 @@ bool is_endless_flood(const std::string& name) {
     return false;
   }
   const SimulatedSensorOptions options = options_of(SourceName(name));
-  // 6 GB in ten minutes: such a recording, if forgotten, still fits on most disks. The DigiTacts
-  // array gives 1.8 MB/s at 100 Hz and 100 times real time.
-  constexpr double most_bytes_per_s = 10e6;
-  const std::size_t elements =
-      options.elements_mm.empty() ? digitacts_array().size() : options.elements_mm.size();
-  // A recording stores readings as floats, and time, losses and a pose of three numbers in 8 bytes
-  // each.
-  const auto frame_bytes = static_cast<double>(elements * sizeof(float) + 5 * sizeof(double));
-  return !options.touches &&
-         (!options.speed || options.rate_hz * *options.speed * frame_bytes > most_bytes_per_s);
+  return !options.touches && !options.speed;
 }
 
 std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {

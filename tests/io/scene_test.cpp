@@ -172,6 +172,7 @@ TEST_F(SceneFile, NamesValuesThatItCannotTake) {
 TEST_F(SceneFile, IsOneDocumentOfYaml) {
   EXPECT_EQ(read("---\nratio: 0.3\n...\n").options.at("ratio"), "0.3");
   expect_named(message("ratio: 0.3\n---\nbins: auto"), {"line 2", "second document"});
+  expect_named(message("ratio: 0.3\n...\n\nbins: auto"), {"line 4", "second document"});
   expect_named(message("ratio: 0.3\nobjects: [1, 2\nbins: 3"), {"line", "YAML"});
   expect_named(input_error([&] { read_scene(folder_ / "no.yaml"); }), {"no.yaml", "no such file"});
 }
