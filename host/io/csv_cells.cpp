@@ -26,17 +26,11 @@ std::size_t closing_quote(std::string_view line, std::size_t begin) {
   return at;
 }
 
-/// The number of cells; 0 where the line is no row. One that ends in a separator counts the empty
-/// cell behind it.
-std::size_t count_cells(std::string_view line, char separator) {
-  std::vector<std::string_view> cells;
-  return split_cells(line, separator, cells) == nullptr ? cells.size() : 0;
-}
-
+/// The cells, with the empty one behind a last separator; none where the line is no row.
 std::vector<std::string_view> cells_in(std::string_view line, char separator) {
   std::vector<std::string_view> cells;
-  split_cells(line, separator, cells);
-  return cells;
+  const bool is_row = split_cells(line, separator, cells) == nullptr;
+  return is_row ? cells : std::vector<std::string_view>();
 }
 
 bool is_half_empty(const std::vector<std::string_view>& cells) {
@@ -180,7 +174,7 @@ TableStart find_table(const std::vector<std::string>& lines) {
   std::size_t largest = 0;
   for (const std::string& line : lines) {
     const char separator = separator_of(line);
-    const std::size_t width = count_cells(line, separator);
+    const std::size_t width = cells_in(line, separator).size();
     const std::size_t count = width == 0 ? 0 : ++counts[{separator, width}];
     // Of shapes as frequent the one that comes last, but for lines that have no separator.
     if (count > largest || (count == largest && width > 1)) {
@@ -191,7 +185,9 @@ TableStart find_table(const std::vector<std::string>& lines) {
   const char separator = shape.first;
   const std::size_t width = shape.second;
   TableStart start{.first = 0, .separator = separator};
-  const auto has_width = [&](std::size_t i) { return count_cells(lines[i], separator) == width; };
+  const auto has_width = [&](std::size_t i) {
+    return cells_in(lines[i], separator).size() == width;
+  };
   while (start.first < lines.size() && !has_width(start.first)) {
     const auto cells = cells_in(lines[start.first], separator);
     if (cells.size() > 1 && are_numbers(cells, separator)) {

@@ -172,7 +172,13 @@ void CsvTable::name_columns() {
   if (has_header_ && cells_.size() > 1 && cells_.back().empty()) {
     cells_.pop_back();  // a separator ends each row
   }
-  first_cells_.assign(cells_.begin(), cells_.end());
+  constexpr std::size_t enough = 4;
+  std::vector<std::string> shown;
+  for (std::size_t i = 0; i < std::min(enough, cells_.size()); ++i) {
+    shown.push_back(fmt::format("'{}'", printable(cells_[i])));
+  }
+  header_words_ =
+      fmt::format("{}{}", fmt::join(shown, ", "), cells_.size() > enough ? ", ..." : "");
   std::set<std::string> seen;
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     columns_.push_back(has_header_ ? std::string(cells_[i]) : std::to_string(i + 1));
@@ -181,15 +187,6 @@ void CsvTable::name_columns() {
       refuse_columns("two columns are called '{}'; rename one", printable(name));
     }
   }
-}
-
-std::string CsvTable::header_words() const {
-  constexpr std::size_t enough = 4;
-  std::vector<std::string> shown;
-  for (std::size_t i = 0; i < std::min(enough, first_cells_.size()); ++i) {
-    shown.push_back(fmt::format("'{}'", printable(first_cells_[i])));
-  }
-  return fmt::format("{}{}", fmt::join(shown, ", "), first_cells_.size() > enough ? ", ..." : "");
 }
 
 std::optional<std::size_t> CsvTable::find(std::string_view name) const {

@@ -73,7 +73,7 @@ class CsvTable {
   /// Number of the line that holds the names, or of the first row.
   std::uint64_t header_number() const { return header_number_; }
   /// Its first cells, "'time', 'p0', 'p1', ...".
-  std::string header_words() const;
+  const std::string& header_words() const { return header_words_; }
 
   /// Passes over the rows whose cell in the column is not this text, or this number.
   void keep_where(std::size_t column, std::string value);
@@ -134,7 +134,7 @@ class CsvTable {
   bool row_is_ready_ = false;  ///< the first row, which was no header
   bool row_is_first_ = false;  ///< the row is the table's first, which was no header
   std::vector<std::string> columns_;
-  std::vector<std::string> first_cells_;  ///< of the header, or the first row
+  std::string header_words_;
   std::vector<std::string_view> cells_;
   std::vector<std::pair<std::size_t, std::string>> kept_;
 };

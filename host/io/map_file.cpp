@@ -92,15 +92,15 @@ void read_cells(const std::filesystem::path& path, const Hdf5Contents& file,
   });
 }
 
-/// All numbers of a dataset of this shape.
-template <typename Number = double>
-std::vector<Number> read_all(const Hdf5Contents& file, const char* name,
-                             const std::vector<std::uint64_t>& shape,
-                             const char* remedy = "build the map anew") {
+/// All values of a dataset of this shape.
+template <typename Value = double>
+std::vector<Value> read_all(const Hdf5Contents& file, const char* name,
+                            const std::vector<std::uint64_t>& shape,
+                            const char* remedy = "build the map anew") {
   if (file.shape(name) != shape) {
     file.refuse("dataset '{}' has the shape {}, not {}; {}", name, file.shape(name), shape, remedy);
   }
-  return file.read<Number>(name);
+  return file.read<Value>(name);
 }
 
 /// The groups of `touches` touches, as write_groups() wrote them.
@@ -160,29 +160,23 @@ std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path,
     file.refuse("dataset 'touch_pressure' has the shape [{}, {}]; build the map anew", n, e);
   }
   touches.pressure = read_all(file, "touch_pressure", {n, e});
-  const std::vector<double> poses = read_all(file, "touch_pose", {n, 3});
-  for (std::size_t i = 0; i < n; ++i) {
-    touches.T_robot_sensor.push_back({{poses[3 * i], poses[3 * i + 1]}, poses[3 * i + 2]});
-  }
+  touches.T_robot_sensor = read_all<Pose>(file, "touch_pose", {n, 3});
   const bool changes = file.shape("touch_elements").size() == 3;
-  const std::vector<double> elements = changes ? read_all(file, "touch_elements", {n, e, 2})
-                                               : read_all(file, "touch_elements", {e, 2});
-  for (std::size_t k = 0; k < elements.size(); k += 2) {
-    touches.elements_mm.emplace_back(elements[k], elements[k + 1]);
-  }
+  touches.elements_mm = changes ? read_all<glm::dvec2>(file, "touch_elements", {n, e, 2})
+                                : read_all<glm::dvec2>(file, "touch_elements", {e, 2});
+  const auto require = [&](bool is_sound, const char* name, const std::vector<double>& pair) {
+    if (!is_sound) {
+      file.refuse("attribute '{}' is {}, {}; build the map anew", name, pair[0], pair[1]);
+    }
+  };
   if (file.has_attribute("left_out_fit")) {
     const std::vector<double> z = file.numbers("left_out_fit", 2);
-    if (!(z[1] > 0.0)) {
-      file.refuse("attribute 'left_out_fit' has the standard deviation {}; build the map anew",
-                  z[1]);
-    }
+    require(z[1] > 0.0, "left_out_fit", z);
     source->left_out = FitScale{.mean = z[0], .sd = z[1]};
   }
   if (file.has_attribute("pose_scale")) {
     const std::vector<double> scale = file.numbers("pose_scale", 2);
-    if (!(scale[0] > 0.0 && scale[1] >= 0.0)) {
-      file.refuse("attribute 'pose_scale' is {}, {}; build the map anew", scale[0], scale[1]);
-    }
+    require(scale[0] > 0.0 && scale[1] >= 0.0, "pose_scale", scale);
     source->pose_scale = PoseScale{.factor = scale[0], .map_sd_mm = scale[1]};
   }
   if (file.has_attribute("groups")) {
@@ -295,11 +289,10 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
   if (map.spread_mm) {
     file.attribute("spread_mm", *map.spread_mm);
   }
-  if (map.mirror) {
-    file.attribute("mirror", 1);
-  }
-  if (map.drawn) {
-    file.attribute("drawn", 1);
+  for (const auto& [name, holds] : {std::pair{"mirror", map.mirror}, {"drawn", map.drawn}}) {
+    if (holds) {
+      file.attribute(name, 1);
+    }
   }
   if (map.suggested_symmetry) {
     file.attribute("suggested_symmetry", *map.suggested_symmetry);

@@ -54,9 +54,7 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
   const std::vector<UnitColumn> pose = find_pose(table, options).columns;
   std::vector<std::size_t> taken;
   const auto take = [&](const std::optional<std::size_t>& column) {
-    if (column) {
-      taken.push_back(*column);
-    }
+    taken.insert(taken.end(), column ? 1 : 0, column.value_or(0));
   };
   take(device_time);
   take(lost_before);
@@ -240,13 +238,13 @@ PressureTable read_pressures(const std::filesystem::path& path, std::size_t elem
   return *std::move(pressures);
 }
 
-ArrayTable read_array(const std::filesystem::path& path) {
+Recording read_array(const std::filesystem::path& path) {
   CsvTable table(path);
   const UnitColumn x = find_axis(table, 0);
   const UnitColumn y = find_axis(table, 1);
   const auto valid = table.find("valid");
   const auto baseline = table.find("baseline");
-  ArrayTable array;
+  Recording array;
   while (table.next()) {
     array.elements_mm.emplace_back(coordinate(table, x), coordinate(table, y));
     if (valid) {

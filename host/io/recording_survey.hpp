@@ -38,13 +38,8 @@ class ReadingHistogram {
 struct ElementSurvey {
   std::uint64_t known = 0;      ///< rows with a known reading
   std::uint64_t alive = 0;      ///< rows in which the element is not dead
-  std::uint64_t changes = 0;    ///< known readings that differ from the known reading before
-  std::uint64_t zeros = 0;      ///< readings of exactly 0
   std::uint64_t contacts = 0;   ///< readings above the threshold
   std::uint64_t strongest = 0;  ///< rows in contact in which it reads the most of all elements
-  double last = 0.0;            ///< the last known reading
-
-  bool constant() const { return known > 0 && changes == 0; }
 };
 
 /// What the pressures of a recording hold.

@@ -39,7 +39,7 @@ std::optional<std::array<std::size_t, 2>> grid_size(const ImportOptions& options
 /// Reads `array`, its elements in the order of their readings, as a grid or as a file, or takes the
 /// elements of a program; checks `pressure-unit`.
 /// @throws Error naming the option, or the file's line and column
-ArrayTable import_array(const ImportOptions& options);
+Recording import_array(const ImportOptions& options);
 
 /// Marks as dead the elements without any reading. In touches, which have no unknown readings, it
 /// also marks single readings.

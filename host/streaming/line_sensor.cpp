@@ -60,9 +60,8 @@ std::optional<Frame> LineSensor::next(std::chrono::milliseconds timeout) {
 }
 
 void LineSensor::take(const LineReader::Line& line) {
-  using Kind = FrameLines::Flaw::Kind;
   if (line.too_long) {
-    refuse_line(line, Kind::malformed, "is longer than any frame");
+    refuse_line(line, {.words = "is longer than any frame"});
     return;
   }
   const double read_s = host_clock_s();
@@ -75,8 +74,8 @@ void LineSensor::take(const LineReader::Line& line) {
     }
   }
   if (const auto* flaw = std::get_if<FrameLines::Flaw>(&read)) {
-    if (!may_stand_before(line, flaw->words)) {
-      refuse_line(line, flaw->kind, flaw->words);
+    if (!may_stand_before(line, *flaw)) {
+      refuse_line(line, *flaw);
     }
   } else if (auto* frame = std::get_if<Frame>(&read)) {
     say_first(read_s, frame->host_time_s);
@@ -92,7 +91,7 @@ void LineSensor::take(const LineReader::Line& line) {
 }
 
 /// Leaves out a line before the first frame that a board prints as it starts.
-bool LineSensor::may_stand_before(const LineReader::Line& line, const std::string& flaw) {
+bool LineSensor::may_stand_before(const LineReader::Line& line, const FrameLines::Flaw& flaw) {
   constexpr std::uint64_t limit = 100;
   const bool is_cut = line.number == 1 && !trimmed(line.text).starts_with('{');
   if (counters_.frames > 0 || before_ == limit || !(is_cut || FrameLines::is_text(line.text))) {
@@ -140,22 +139,22 @@ void LineSensor::say_first(double now_s, double time_s) {
   }
 }
 
-std::string LineSensor::words_about(const LineReader::Line& line, const std::string& flaw) const {
+std::string LineSensor::words_about(const LineReader::Line& line,
+                                    const FrameLines::Flaw& flaw) const {
   return fmt::format(
       "{}, line {}: {}; write {{\"time\": s, \"pressure\": [{} numbers]}}, or CSV with {} "
       "readings, behind their time where it is known",
-      reader_.name(), line.number, flaw, format_.elements(), format_.elements());
+      reader_.name(), line.number, flaw.words, format_.elements(), format_.elements());
 }
 
-void LineSensor::refuse_line(const LineReader::Line& line, FrameLines::Flaw::Kind kind,
-                             const std::string& flaw) {
+void LineSensor::refuse_line(const LineReader::Line& line, const FrameLines::Flaw& flaw) {
   const std::string text = words_about(line, flaw);
   if (counters_.frames == 0) {
     throw Error(Fault::input, text);
   }
   ++lost_before_;
   ++counters_.lost;
-  flaws_.add(kind, text);
+  flaws_.add(flaw.kind, text);
 }
 
 }  // namespace palpate

@@ -35,11 +35,10 @@ class LineSensor : public Sensor {
 
  private:
   void take(const LineReader::Line& line);
-  bool may_stand_before(const LineReader::Line& line, const std::string& flaw);
-  std::string words_about(const LineReader::Line& line, const std::string& flaw) const;
+  bool may_stand_before(const LineReader::Line& line, const FrameLines::Flaw& flaw);
+  std::string words_about(const LineReader::Line& line, const FrameLines::Flaw& flaw) const;
   void say_first(double now_s, double time_s);
-  void refuse_line(const LineReader::Line& line, FrameLines::Flaw::Kind kind,
-                   const std::string& flaw);
+  void refuse_line(const LineReader::Line& line, const FrameLines::Flaw& flaw);
 
   SensorDescription description_;
   PosedSensor::Warn warn_;

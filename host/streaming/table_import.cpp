@@ -152,7 +152,7 @@ void mount_array(const SpatialPose& mount, PoseTable& poses) {
 }
 
 /// The recording of rows that are read.
-ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, ImportRows rows) {
+ImportedRecording recording_of(const ImportOptions& options, Recording array, ImportRows rows) {
   const std::optional<glm::dvec3> normal = plane_normal(options.plane);
   const std::optional<SpatialPose> mount = mount_of(options.mount);
   auto& [pressures, poses, T_robot_object, elements] = rows;
@@ -167,11 +167,9 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
   imported.understood.insert(imported.understood.end(), stretches.begin(), stretches.end());
   imported.holds_poses = pressures.holds_poses;
   Recording& recording = imported.recording;
+  recording = std::move(array);
   recording.pressure_unit = options.pressure_unit;
   recording.object = options.object;
-  recording.elements_mm = std::move(array.elements_mm);
-  recording.valid = std::move(array.valid);
-  recording.baseline = std::move(array.baseline);
   recording.pressure = std::move(pressures.pressure);
   if (options.sign < 0) {
     std::ranges::transform(recording.baseline, recording.baseline.begin(), std::negate<>{});
@@ -216,7 +214,7 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
 ImportedRecording import_tables(const ImportOptions& options) {
   validate(options);
   check_numbers(options);
-  ArrayTable array = import_array(options);
+  Recording array = import_array(options);
   const auto require_column = [&](const std::string& option, const std::string& name) {
     if (!has_column(options.pressures, name) && !has_column(options.poses, name)) {
       refuse(fmt::format("`{}`", option), "no table has this column; give its name");
@@ -269,7 +267,7 @@ void require_sound(const ImportOptions& options) {
 
 ImportedRecording import_rows(const ImportOptions& options, ImportRows rows) {
   check_numbers(options);
-  ArrayTable array = import_array(options);
+  Recording array = import_array(options);
   if (array.elements_mm.size() != rows.elements) {
     refuse(options.pressures,
            "has {} readings a frame for an array of {} elements; correct `array`", rows.elements,

@@ -221,7 +221,6 @@ Pose in_degrees(const Pose& T) {
 Pose counted_on(const Pose& T) { return {T.translation_mm, T.theta_rad + 1.5 * std::numbers::pi}; }
 
 const Change twice_again = both(write_again(20, 30), write_again(20, 31));
-const Change constant_elements = both(element(4, 7.25), element(9, 7.25));
 
 /// What is suspected of a recording after a change: one thing that says both, or nothing.
 struct Rule {
@@ -246,10 +245,6 @@ const Rule rules[] = {
     {"PosesOfOnePlace", training, both(each_pose(in_metres), tremble)},
     {"AnglesInDegrees", training, each_pose(in_degrees), "330", "degrees"},
     {"AnglesBeyondATurn", training, each_pose(counted_on)},
-    {"ConstantElements", training, constant_elements, "Elements 4, 9 read", "7.25 kPa"},
-    {"ElementOfZero", training, element(4, 0.0), "Element 4 reads", "0 kPa"},
-    {"ConstantReadings", training, each_reading([](double) { return 3.0; }, "kPa"),
-     "No element's reading ever changes"},
     {"NothingInContact", training, scale(&Recording::pressure, 1e-3), "ever in contact", "2 kPa"},
     {"SmallRawReadings", training, each_reading([](double kpa) { return 1e-3 * kpa; }, "raw")},
     {"Pascals", training, scale(&Recording::pressure, 1e3), "10000 kPa", "pascals"},
