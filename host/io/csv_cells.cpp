@@ -33,6 +33,17 @@ std::vector<std::string_view> cells_in(std::string_view line, char separator) {
   return is_row ? cells : std::vector<std::string_view>();
 }
 
+/// True for the text of a number, finite or not.
+bool is_numeric(std::string_view cell, char separator) {
+  std::string text(cell.substr(cell.starts_with('+') ? 1 : 0));
+  if (separator != ',') {
+    std::ranges::replace(text, ',', '.');
+  }
+  double number = 0.0;
+  const char* const end = text.data() + text.size();
+  return !text.empty() && std::from_chars(text.data(), end, number).ptr == end;
+}
+
 bool is_half_empty(const std::vector<std::string_view>& cells) {
   return 2 * static_cast<std::size_t>(std::ranges::count(cells, std::string_view())) >=
          cells.size();
@@ -124,16 +135,6 @@ std::optional<double> number_in(std::string_view cell, char separator) {
   std::string with_point(cell);
   std::ranges::replace(with_point, ',', '.');
   return number_of(with_point);
-}
-
-bool is_numeric(std::string_view cell, char separator) {
-  std::string text(cell.substr(cell.starts_with('+') ? 1 : 0));
-  if (separator != ',') {
-    std::ranges::replace(text, ',', '.');
-  }
-  double number = 0.0;
-  const char* const end = text.data() + text.size();
-  return !text.empty() && std::from_chars(text.data(), end, number).ptr == end;
 }
 
 bool are_numbers(const std::vector<std::string_view>& cells, char separator) {

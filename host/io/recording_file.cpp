@@ -192,7 +192,10 @@ void RecordingFile::read_elements() {
 
 void RecordingFile::read(std::uint64_t first, std::uint64_t count, Recording& rows) const {
   const auto read_list = [&]<typename Value>(const char* name, std::vector<Value>& list) {
-    list = file_->has_dataset(name) ? file_->read<Value>(name, first, count) : std::vector<Value>();
+    list = std::vector<Value>();  // frees the rows before
+    if (file_->has_dataset(name)) {
+      list = file_->read<Value>(name, first, count);
+    }
   };
   read_list("pressure", rows.pressure);
   read_list("sensor_pose", rows.T_robot_sensor);

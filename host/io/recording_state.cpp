@@ -33,8 +33,6 @@ bool is_marked_open(const std::filesystem::path& path) {
          bytes[flags] != 0;
 }
 
-void mark_as_being_recorded(int descriptor) { ::flock(descriptor, LOCK_SH | LOCK_NB); }
-
 Recorder recorder_of(const std::filesystem::path& path) {
   const Descriptor file(path, O_RDONLY);
   if (file.valid() && ::flock(file.get(), LOCK_EX | LOCK_NB) == 0) {

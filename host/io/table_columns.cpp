@@ -207,15 +207,12 @@ void validate(const TableOptions& options) {
 }
 
 std::optional<Unit> given_unit(const TableOptions& options, std::span<const Unit> units) {
-  const std::string& pose = options.pose_unit;
-  const std::size_t comma = std::min(pose.find(','), pose.size());
-  const std::string name = units.data() == time_units.data()     ? options.time_unit
-                           : units.data() == length_units.data() ? pose.substr(0, comma)
-                           : units.data() == angle_units.data()
-                               ? pose.substr(std::min(comma + 1, pose.size()))
-                               : "";
-  const auto found = std::ranges::find(units, name, &Unit::name);
-  return name.empty() || found == units.end() ? std::nullopt : std::optional(*found);
+  std::vector<std::string_view> names = split_text(options.pose_unit, ',');
+  names.emplace_back(options.time_unit);
+  const auto found = std::ranges::find_if(units, [&](const Unit& unit) {
+    return !unit.name.empty() && std::ranges::find(names, unit.name) != names.end();
+  });
+  return found == units.end() ? std::nullopt : std::optional(*found);
 }
 
 std::vector<std::pair<std::string, std::string>> conditions(const TableOptions& options) {

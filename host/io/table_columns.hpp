@@ -59,8 +59,8 @@ struct TableOptions {
 /// @throws Error naming the option whose value makes no sense
 void validate(const TableOptions& options);
 
-/// The unit that the options give for times, lengths or angles, whichever `units` (time_units,
-/// length_units or angle_units: compared by address) are; none where they give none.
+/// The one of these units that the options give for times, lengths or angles; none where they give
+/// none.
 std::optional<Unit> given_unit(const TableOptions& options, std::span<const Unit> units);
 
 /// `where` as pairs of a column and the value that its cells must have; call validate() first.
