@@ -59,6 +59,7 @@ class FrameSmoother {
   struct Medians {
     double time_s;
     std::vector<double> values;  ///< [e] NaN: Unknown
+    bool whole;                  ///< no element is Unknown
   };
 
   // Bounds memory and work where times do not advance; more frames would hardly improve the mean.
@@ -72,8 +73,10 @@ class FrameSmoother {
     const std::size_t e = pressure.size();
     recent_.resize(e);
     std::vector<double> middle(e, std::numeric_limits<double>::quiet_NaN());
+    bool whole = true;
     for (std::size_t i = 0; i < e; ++i) {
       if (std::isnan(pressure[i])) {
+        whole = false;
         continue;
       }
       Recent& recent = recent_[i];
@@ -84,7 +87,7 @@ class FrameSmoother {
       recent.last_s = time_s;
       middle[i] = median(recent.readings[0], recent.readings[1], recent.readings[2]);
     }
-    window_.push_back({.time_s = time_s, .values = std::move(middle)});
+    window_.push_back({.time_s = time_s, .values = std::move(middle), .whole = whole});
   }
 
   // Sums anew for every frame: in a running sum, the rounding of a single reading of 1e20 would
@@ -94,16 +97,25 @@ class FrameSmoother {
     sum_.assign(e, 0.0);
     known_.assign(e, 0.0);
     mean_.resize(e, 0.0);
+    double whole = 0.0;
     for (const Medians& medians : window_) {
-      for (std::size_t i = 0; i < e; ++i) {
-        const bool known = !std::isnan(medians.values[i]);
-        sum_[i] += known ? medians.values[i] : 0.0;
-        known_[i] += known ? 1.0 : 0.0;
+      if (medians.whole) {
+        // Nearly all frames are whole; this loop takes a third of the other loop's time.
+        for (std::size_t i = 0; i < e; ++i) {
+          sum_[i] += medians.values[i];
+        }
+        whole += 1.0;
+      } else {
+        for (std::size_t i = 0; i < e; ++i) {
+          const bool known = !std::isnan(medians.values[i]);
+          sum_[i] += known ? medians.values[i] : 0.0;
+          known_[i] += known ? 1.0 : 0.0;
+        }
       }
     }
     for (std::size_t i = 0; i < e; ++i) {
-      if (known_[i] > 0.0) {
-        mean_[i] = sum_[i] / known_[i];
+      if (const double known = whole + known_[i]; known > 0.0) {
+        mean_[i] = sum_[i] / known;
       } else if (recent_[i].count == 0 || time_s - recent_[i].last_s > largest_gap_s_) {
         mean_[i] = 0.0;
       }
@@ -115,7 +127,7 @@ class FrameSmoother {
   std::vector<Recent> recent_;  ///< [e]
   std::deque<Medians> window_;
   std::vector<double> sum_;    ///< [e] of the window
-  std::vector<double> known_;  ///< [e] its known medians
+  std::vector<double> known_;  ///< [e] known medians of its frames that are not whole
   std::vector<double> mean_;   ///< [e]
 };
 
