@@ -26,8 +26,6 @@ constexpr std::size_t longest_line = 16 << 20;
 // Lines that show where a table begins.
 constexpr std::size_t enough_lines = 200;
 
-bool is_unknown(std::string_view cell) { return cell.empty() || alike(cell, "nan"); }
-
 /// The separator that a spreadsheet's first line "sep=;" names.
 std::optional<char> separator_named(std::string_view line) {
   constexpr std::string_view key = "sep=";
@@ -265,7 +263,7 @@ bool CsvTable::next_numbers(bool& passed) {
 
 std::optional<double> CsvTable::number(std::size_t column) const {
   const std::string_view cell = cells_[column];
-  if (is_unknown(cell)) {
+  if (cell.empty() || alike(cell, "nan")) {
     return {};
   }
   const std::optional<double> number = number_in(cell, separator_);

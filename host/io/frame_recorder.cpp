@@ -44,7 +44,6 @@ struct Rows {
   std::vector<double> time_s;
 
   std::size_t size() const { return time_s.size(); }
-  void clear() { *this = {}; }
 };
 
 // Returns the recording without its rows.
@@ -102,7 +101,7 @@ struct FrameRecorder::Impl {
       append();
       saved += rows;
     }
-    pending.clear();
+    pending = {};
   }
 
   // Calls use(name, shape of a row, values) of every dataset that grows. `time` comes last: a row

@@ -254,14 +254,13 @@ bool is_endless_flood(const std::string& name) {
 }
 
 std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
-  if (name.starts_with(replay)) {
-    const SourceName source(name);
-    return std::make_unique<ReplayedSensor>(source.what(), source.speed());
-  }
-  if (!name.starts_with(simulate)) {
+  if (!is_virtual_sensor(name)) {
     refuse("sensor " + name, "write replay:FILE or simulate:SHAPE");
   }
   const SourceName source(name);
+  if (name.starts_with(replay)) {
+    return std::make_unique<ReplayedSensor>(source.what(), source.speed());
+  }
   return make_simulated_sensor(source.what(), options_of(source));
 }
 
