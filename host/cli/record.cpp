@@ -139,8 +139,8 @@ void record(const RecordArguments& options) {
     require_above("--seconds", *options.seconds, 0.0);
   } else if (is_endless_flood(options.sensor)) {
     refuse("sensor " + options.sensor,
-           "the simulation has no end and gives more than 10 MB/s, which would fill the disk; give "
-           "--seconds, touches=N, or a lower rate or speed");
+           "the simulation has no end and gives frames as fast as they are taken, which would fill "
+           "the disk; give --seconds, touches=N, or a speed");
   }
   require_above("--tare", options.tare_s, 0.0, true);
   if (!is_printable(options.object)) {

@@ -10,7 +10,7 @@
 #include "io/input_file.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/virtual_sensor.hpp"
-#include "streaming/import_array.hpp"
+#include "streaming/import_steps.hpp"
 
 namespace palpate::cli {
 
@@ -87,7 +87,7 @@ std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
            "standard input holds the frames of --sensor -; give the poses as a file or a FIFO, or "
            "x_mm, y_mm and theta_rad in the lines of the frames");
   }
-  ArrayTable array = import_array(arguments.lines);
+  Recording array = import_array(arguments.lines);
   if (arguments.lines.sign < 0) {
     std::ranges::transform(array.baseline, array.baseline.begin(), std::negate<>{});
   }

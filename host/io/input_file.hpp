@@ -9,19 +9,9 @@
 #include <string_view>
 #include <tuple>
 
-#include <fmt/format.h>
-
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 
 namespace palpate {
-
-/// Throws Error (Fault::input), "<source>: <message>"; the source is mostly a file, and the message
-/// is formatted as by fmt::format().
-template <typename... Parts>
-[[noreturn]] void refuse(const std::filesystem::path& source,
-                         fmt::format_string<const Parts&...> message, const Parts&... parts) {
-  throw Error(Fault::input, fmt::format("{}: {}", source.string(), fmt::format(message, parts...)));
-}
 
 /// Size in bytes of a regular file that may be read.
 /// @throws Error where it is missing, a folder, not a regular file or not readable.
