@@ -10,10 +10,6 @@
 #include <string>
 #include <utility>
 
-#include <fmt/format.h>
-
-#include "model/angle_unit.hpp"
-#include "model/elements_that.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/touch_detector.hpp"
@@ -95,7 +91,7 @@ class Survey {
       }
       const std::vector<double>& baseline = head_.baseline;
       const double pressure = readings[element] - (baseline.empty() ? 0.0 : baseline[element]);
-      take_reading(element, readings[element], pressure);
+      take_reading(row, element, readings[element], pressure);
       if (!std::isnan(readings[element]) && (!strongest || pressure > *strongest)) {
         strongest = pressure;
         strongest_element = element;
@@ -109,7 +105,7 @@ class Survey {
     return true;
   }
 
-  void take_reading(std::size_t of_element, double reading, double pressure) {
+  void take_reading(std::uint64_t row, std::size_t of_element, double reading, double pressure) {
     PressureSurvey& all = result_.pressure;
     ElementSurvey& element = all.elements[of_element];
     ++element.alive;
@@ -117,10 +113,25 @@ class Survey {
       ++all.unknown;
       return;
     }
+    element.changes += element.known > 0 && reading != element.last ? 1 : 0;
     ++element.known;
+    element.zeros += reading == 0.0 ? 1 : 0;
+    element.last = reading;
     element.contacts += result_.threshold && pressure > *result_.threshold ? 1 : 0;
     all.readings.add(reading);
+    if (!all.range || reading > all.range->most) {
+      all.at_most = 0;
+      all.times_at_most = 0;
+    }
     include(all.range, reading);
+    if (reading == all.range->most) {
+      const std::uint64_t apart = head_.rows == "frames" ? 2 : 1;
+      if (all.at_most == 0 || row >= last_at_most_ + apart) {
+        ++all.times_at_most;
+      }
+      ++all.at_most;
+      last_at_most_ = row;
+    }
   }
 
   void take_pose(const Pose& T_robot_sensor) {
@@ -170,173 +181,12 @@ class Survey {
   const Recording& head_ = file_.head().recording;
   std::size_t e_ = file_.head().elements;
   RecordingSurvey result_;
+  std::uint64_t last_at_most_ = 0;     ///< last row with the largest reading
   std::vector<std::size_t> touches_;   ///< hashes of the touches in contact
   std::vector<glm::dvec2> places_mm_;  ///< of the living elements in the first row
   std::vector<std::size_t> placed_;    ///< their indices in the array
   StreamTime time_;
   std::optional<double> last_s_;
-};
-
-// With fewer rows, an element that is in contact in all of them says nothing.
-constexpr std::uint64_t least_rows = 20;
-
-class RecordingFindings {
- public:
-  explicit RecordingFindings(const RecordingSurvey& survey) : s_(survey), p_(survey.pressure) {}
-
-  std::vector<std::string> all() {
-    look_at_array();
-    look_at_poses();
-    if (s_.repeated > 0) {
-      say("{} of {} touches equal an earlier one to the digit, and count as one with it.",
-          s_.repeated, s_.head.rows);
-    }
-    look_at_times();
-    look_at_pressures();
-    look_at_elements();
-    return std::move(found_);
-  }
-
- private:
-  template <typename... Parts>
-  void say(fmt::format_string<const Parts&...> sentence, const Parts&... parts) {
-    std::string text = fmt::format(sentence, parts...);
-    if (text.starts_with("element")) {
-      text.front() = 'E';
-    }
-    found_.push_back(std::move(text));
-  }
-
-  std::vector<std::size_t> elements_where(
-      const std::function<bool(const ElementSurvey&)>& holds) const {
-    std::vector<std::size_t> elements;
-    for (std::size_t i = 0; i < p_.elements.size(); ++i) {
-      if (holds(p_.elements[i])) {
-        elements.push_back(i);
-      }
-    }
-    return elements;
-  }
-
-  void look_at_array() {
-    if (!s_.array) {
-      say("All elements are marked dead in 'valid'.");
-      return;
-    }
-    const RecordingSurvey::Array& array = *s_.array;
-    // No array is made so small.
-    constexpr double least_pitch_mm = 0.01;
-    constexpr double least_array_mm = 0.5;
-    if (s_.spacing) {
-      const ElementSpacing& spacing = *s_.spacing;
-      const double array_mm = std::hypot(array.x_mm.span(), array.y_mm.span());
-      if (array_mm < least_array_mm) {
-        say("The array is {:.3g} mm long; 'elements' holds mm: are these metres?", array_mm);
-      } else if (spacing.nearest_mm.least < least_pitch_mm) {
-        say("Elements {} and {} lie {:.3g} mm apart, at the same place.", spacing.closest[0],
-            spacing.closest[1], spacing.nearest_mm.least);
-      }
-    }
-    constexpr double farthest_mm = 1000.0;
-    const double reach_mm =
-        std::max(array.x_mm.largest_magnitude(), array.y_mm.largest_magnitude());
-    if (reach_mm > farthest_mm) {
-      say("Elements lie up to {:.4g} mm from the origin of the sensor frame; 'elements' holds mm: "
-          "are these micrometres, or places in the robot frame?",
-          reach_mm);
-    }
-  }
-
-  void look_at_poses() {
-    const bool frames = s_.head.recording.rows == "frames";
-    if (frames && s_.with_pose == 0) {
-      say("No frame has a pose, which touches need for a map or for recognition.");
-    } else if (frames && 2 * s_.with_pose < s_.head.rows) {
-      say("{} of {} frames have no pose.", s_.head.rows - s_.with_pose, s_.head.rows);
-    }
-    if (!s_.poses) {
-      return;
-    }
-    if (seem_metres(*s_.poses)) {
-      say("All poses lie within {:.3g} x {:.3g} mm although the array is touched at many places; "
-          "'sensor_pose' holds mm: are these metres?",
-          s_.poses->x_mm.span(), s_.poses->y_mm.span());
-    }
-    const Extremes& theta_rad = s_.poses->theta_rad;
-    if (seem_degrees(theta_rad.least, theta_rad.most)) {
-      say("The angle of a pose is {:.4g}; 'sensor_pose' holds radians: are these degrees?",
-          theta_rad.largest_magnitude());
-    }
-  }
-
-  /// Whether poses in mm would leave the sensor where it is, and poses in metres would not.
-  bool seem_metres(const RecordingSurvey::Poses& poses) const {
-    constexpr double still_mm = 1.0;
-    constexpr double jitter_mm = 0.002;  // a robot that stands still
-    constexpr double reach_m = 3.0;      // of a robot
-    const double moved = std::max(poses.x_mm.span(), poses.y_mm.span());
-    const double reach = std::max(poses.x_mm.largest_magnitude(), poses.y_mm.largest_magnitude());
-    if (moved >= still_mm || moved < jitter_mm || reach > reach_m) {
-      return false;
-    }
-    // A sensor that presses the same place again and again mostly feels it with one element.
-    constexpr std::uint64_t least_touches = 5;
-    std::uint64_t strongest_count = 0;
-    for (const ElementSurvey& element : p_.elements) {
-      strongest_count = std::max(strongest_count, element.strongest);
-    }
-    return p_.in_contact >= least_touches && 2 * strongest_count < p_.in_contact;
-  }
-
-  void look_at_times() {
-    if (s_.times_back > 0) {
-      say("Time runs backwards at {} row{}, first at row {}.", s_.times_back,
-          s_.times_back == 1 ? "" : "s", s_.first_back);
-    }
-    if (s_.head.recording.rows == "frames" && 2 * s_.long_steps > s_.head.rows) {
-      say("Most frames come more than 0.5 s apart, too late to find a touch; 'time' holds seconds: "
-          "are these milliseconds?");
-    }
-  }
-
-  void look_at_pressures() {
-    if (!p_.range) {
-      return;
-    }
-    const std::string& unit = s_.head.recording.pressure_unit;
-    if (s_.threshold && p_.in_contact == 0) {
-      say("No element is ever in contact: no reading is more than {} {} above {}; is "
-          "'pressure_unit' right?",
-          *s_.threshold, unit, s_.head.recording.baseline.empty() ? "0" : "the baseline");
-    }
-    // 10 MPa. Contacts seldom give fewer than 1 % of the readings, glitches hardly ever as many.
-    constexpr double most_kpa = 1e4;
-    if (unit == "kPa" && p_.readings.quantile(0.99) > most_kpa) {
-      say("One in a hundred readings is above {} kPa; are these pascals or raw readings?",
-          most_kpa);
-    }
-  }
-
-  void look_at_elements() {
-    const auto unknown =
-        elements_where([](const ElementSurvey& e) { return e.alive > 0 && e.known == 0; });
-    if (!unknown.empty()) {
-      say("{} no known reading in any row.", elements_that(unknown, "has", "have"));
-    }
-    const std::vector<std::size_t> held = elements_where(
-        [](const ElementSurvey& e) { return e.known >= least_rows && e.contacts == e.known; });
-    // Without a baseline, the readings of an untouched array may be of any size.
-    if (s_.head.recording.rows == "frames" && !s_.head.recording.baseline.empty() &&
-        !held.empty()) {
-      say("{} more than {} {} above the baseline in every frame.",
-          elements_that(held, "reads", "read"), s_.threshold.value_or(0.0),
-          s_.head.recording.pressure_unit);
-    }
-  }
-
-  const RecordingSurvey& s_;
-  const PressureSurvey& p_;
-  std::vector<std::string> found_;
 };
 
 }  // namespace
@@ -370,10 +220,22 @@ double ReadingHistogram::quantile(double part) const {
   return edge_of(counts_.size() - 1);
 }
 
-RecordingSurvey survey_recording(const std::filesystem::path& path) { return Survey(path).run(); }
-
-std::vector<std::string> findings_of(const RecordingSurvey& survey) {
-  return RecordingFindings(survey).all();
+std::uint64_t ReadingHistogram::count(double low, double high) const {
+  std::uint64_t sum = 0;
+  for (std::size_t bin = bin_of(low); bin <= bin_of(high); ++bin) {
+    sum += counts_[bin];
+  }
+  return sum;
 }
+
+std::uint64_t ReadingHistogram::occupied(double low, double high) const {
+  std::uint64_t bins = 0;
+  for (std::size_t bin = bin_of(low); bin <= bin_of(high); ++bin) {
+    bins += counts_[bin] > 0 ? 1 : 0;
+  }
+  return bins;
+}
+
+RecordingSurvey survey_recording(const std::filesystem::path& path) { return Survey(path).run(); }
 
 }  // namespace palpate

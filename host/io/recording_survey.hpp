@@ -25,6 +25,10 @@ class ReadingHistogram {
   /// Returns the reading below which the fraction `part` of all readings lie, rounded towards 0 to
   /// the edge of its bin: whole numbers up to 256 are exact. At least one reading is counted.
   double quantile(double part) const;
+  /// Counts the readings in the bins of `low`, of `high` and between them.
+  std::uint64_t count(double low, double high) const;
+  /// Counts the bins with readings from the bin of `low` to the bin of `high`.
+  std::uint64_t occupied(double low, double high) const;
 
  private:
   static std::size_t bin_of(double reading);
@@ -38,8 +42,13 @@ class ReadingHistogram {
 struct ElementSurvey {
   std::uint64_t known = 0;      ///< rows with a known reading
   std::uint64_t alive = 0;      ///< rows in which the element is not dead
+  std::uint64_t changes = 0;    ///< known readings that differ from the known reading before
+  std::uint64_t zeros = 0;      ///< readings of exactly 0
   std::uint64_t contacts = 0;   ///< readings above the threshold
   std::uint64_t strongest = 0;  ///< rows in contact in which it reads the most of all elements
+  double last = 0.0;            ///< the last known reading
+
+  bool constant() const { return known > 0 && changes == 0; }
 };
 
 /// What the pressures of a recording hold.
@@ -50,6 +59,10 @@ struct PressureSurvey {
   std::optional<Extremes> range;
   std::uint64_t unknown = 0;     ///< NaN readings of living elements
   std::uint64_t in_contact = 0;  ///< rows in contact: all, where no threshold is known
+  std::uint64_t at_most = 0;     ///< readings equal to the largest reading
+  /// Separate times at which the array reads the largest reading. Frames that follow each other are
+  /// one time; each touch is a time of its own.
+  std::uint64_t times_at_most = 0;
 };
 
 /// What a recording holds.

@@ -106,6 +106,8 @@ TEST_F(RecordingSurveyed, QuantilesAreExactToABin) {
   EXPECT_NEAR(readings.quantile(0.125), -50.0, 50.0 / 128.0);
   EXPECT_NEAR(readings.quantile(0.5), 100.0, 100.0 / 128.0);
   EXPECT_NEAR(readings.quantile(1.0), 300.0, 300.0 / 128.0);
+  EXPECT_EQ(readings.count(-100.0, 300.0), 4000u);
+  EXPECT_EQ(readings.occupied(-1e30, -101.0), 0u);
 }
 
 TEST_F(RecordingSurveyed, SpacingIsThatOfAllPairs) {
@@ -166,6 +168,11 @@ Change each_reading(const std::function<double(double)>& change, const char* uni
   };
 }
 
+/// As of an 8-bit sensor, cut at its largest value.
+Change quantize(double gain) {
+  return each_reading([=](double kpa) { return std::min(255.0, std::round(gain * kpa)); }, "raw");
+}
+
 Change element(std::size_t e, const std::function<double(double)>& change) {
   return [=](Recording& r) {
     for (std::size_t i = 0; i < r.size(); ++i) {
@@ -212,6 +219,7 @@ void touch_again_nearby(Recording& r) {
 }
 
 double with_offset(double kpa) { return kpa + 50.0; }
+double as_switch(double kpa) { return kpa > 5.0 ? 1.0 : 0.0; }
 Pose in_metres(const Pose& T) {
   return {1e-3 * T.translation_mm + glm::dvec2(0.6, -0.2), T.theta_rad};
 }
@@ -221,6 +229,7 @@ Pose in_degrees(const Pose& T) {
 Pose counted_on(const Pose& T) { return {T.translation_mm, T.theta_rad + 1.5 * std::numbers::pi}; }
 
 const Change twice_again = both(write_again(20, 30), write_again(20, 31));
+const Change constant_elements = both(element(4, 7.25), element(9, 7.25));
 
 /// What is suspected of a recording after a change: one thing that says both, or nothing.
 struct Rule {
@@ -245,6 +254,13 @@ const Rule rules[] = {
     {"PosesOfOnePlace", training, both(each_pose(in_metres), tremble)},
     {"AnglesInDegrees", training, each_pose(in_degrees), "330", "degrees"},
     {"AnglesBeyondATurn", training, each_pose(counted_on)},
+    {"ConstantElements", training, constant_elements, "Elements 4, 9 read", "7.25 kPa"},
+    {"ElementOfZero", training, element(4, 0.0), "Element 4 reads", "0 kPa"},
+    {"ConstantReadings", training, each_reading([](double) { return 3.0; }, "kPa"),
+     "No element's reading ever changes"},
+    {"ReadingsOf8Bits", training, quantize(8.0)},
+    {"SaturatedReadings", training, quantize(16.0), "exactly the largest, 255 raw", "saturates"},
+    {"Switches", training, each_reading(as_switch, "raw")},
     {"NothingInContact", training, scale(&Recording::pressure, 1e-3), "ever in contact", "2 kPa"},
     {"SmallRawReadings", training, each_reading([](double kpa) { return 1e-3 * kpa; }, "raw")},
     {"Pascals", training, scale(&Recording::pressure, 1e3), "10000 kPa", "pascals"},
