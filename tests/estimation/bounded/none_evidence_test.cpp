@@ -194,22 +194,6 @@ TEST(NoneEvidence, DoesNotDependOnTheOrderButForTheFirstShare) {
   expect_definition(none, touches);
 }
 
-TEST(MeanSearch, FindsTheSameWhereItHasNoRoomForSums) {
-  NoneByBounds none(two_objects(), lattice_of(30, 30, 8));
-  const Recording recording = random_recording(1, 36, 712);
-  const TouchEvidence touch(recording.touch(0), none.options.contact);
-  const KnownElements known = known_elements(touch, none.options);
-  MeanSearch keeping(none.space, none.options, none.likelihood, touch, known, std::size_t{1} << 20);
-  MeanSearch forgetting(none.space, none.options, none.likelihood, touch, known, 0);
-  double least = infinity;
-  for (int search = 0; search < 3; ++search) {
-    const LogInterval kept = keeping.bounds(least, Deadline({})).value();
-    const LogInterval found = forgetting.bounds(least, Deadline({})).value();
-    expect_same(kept, found);
-    least = kept.high - 4.0;
-  }
-}
-
 TEST(NoneEvidence, HoldsItsDefinitionWhereverADeadlineEndsIt) {
   NoneByBounds none(two_objects(), lattice_of(30, 30, 8));
   const Recording recording = random_recording(2, 36, 711);

@@ -43,13 +43,6 @@ class MapPatches {
   std::vector<float> nodes_;
 };
 
-/// Extremes of a table over all readings of one object, in nats.
-struct TableExtent {
-  double largest = 0.0;   ///< magnitude
-  double steepest = 0.0;  ///< difference per nat of log odds
-  double width = 0.0;     ///< from the first node to the last, in nats of log odds
-};
-
 /// How kernels of bins evaluate Eq. 7, or the table in its place. With r = gamma m / s and
 /// s = gamma m + 1 - gamma, the likelihood of contact at log odds z (of no contact at -z) is
 ///
@@ -72,9 +65,6 @@ struct ReadingForm {
     const std::size_t row = (sets == 1 ? 0 : object) * readings + static_cast<std::size_t>(reading);
     return rows.data() + 2 * row * nodes;
   }
-  TableExtent table_extent(std::size_t object) const;
-  /// Largest magnitude of an element's log-likelihood by Eq. 7, for log odds of this magnitude.
-  double largest_nats(double largest_log_odds) const;
 
   Kind kind = Kind::products;
   double ratio = 0.0;      ///< r

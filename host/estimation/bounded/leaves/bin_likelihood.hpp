@@ -23,8 +23,6 @@ struct PlacedMap {
 
   /// Bound, in cells along an axis, of the float64 rounding of an element's place at a bin.
   double place_error(const KnownElements& elements) const;
-  /// Bound of the change of log odds where a place is wrong by so many cells along both axes.
-  double change(double place_cells) const;
 
   MapPatches nodes;
   double cell_mm;

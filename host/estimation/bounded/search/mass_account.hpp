@@ -38,9 +38,13 @@ class UnsettledMass {
   }
 
   /// The first slot from which on all tiles together hold at most this mass, in nats.
-  std::size_t droppable_from(double log_allowance) const;
+  std::size_t droppable_from(double log_allowance) const {
+    return droppable_from({0, used_.size()}, log_allowance);
+  }
   /// The first slot from which on one hypothesis's tiles hold at most this mass, in nats.
-  std::size_t droppable_from(std::size_t hypothesis, double log_allowance) const;
+  std::size_t droppable_from(std::size_t hypothesis, double log_allowance) const {
+    return droppable_from({hypothesis, hypothesis + 1}, log_allowance);
+  }
   /// Bound of the log of a hypothesis's summed likelihood, in nats.
   double log_mass(std::size_t hypothesis) const;
   /// The largest bound that a tile of a hypothesis may have, in nats; -infinity without any.
@@ -58,14 +62,17 @@ class UnsettledMass {
     std::size_t slot = slots;
   };
 
+  /// Some neighbouring hypotheses.
+  struct Hypotheses {
+    std::size_t first;
+    std::size_t end;
+  };
+
   /// Adds up slots from the last one on, until `visit`, after each that holds bins, returns false.
-  /// @param used slots that may hold bins
-  /// @param bins_in(slot) their number
-  template <typename Bins, typename Visit>
-  Reached add_up(const SlotSet& used, const Bins& bins_in, const Visit& visit) const;
+  template <typename Visit>
+  Reached add_up(const Hypotheses& of, const Visit& visit) const;
   Reached add_up(std::size_t hypothesis) const;
-  template <typename Bins>
-  std::size_t droppable_from(const SlotSet& used, const Bins& bins_in, double log_allowance) const;
+  std::size_t droppable_from(const Hypotheses& of, double log_allowance) const;
   /// The bound that no tile in a slot exceeds, in nats.
   double upper_edge(std::size_t slot) const;
   /// What a bin counts for, that many slots further up.
