@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <tbb/task_arena.h>
 
 #include "bound_cases.hpp"
 #include "support/errors.hpp"
@@ -160,10 +159,7 @@ TEST(BinLikelihood, OfATableIsWithinItsBounds) {
 TEST(BinLikelihood, KeepsObjectsTheirRowsOfATableAndThetasApart) {
   BinCase of = letter_case();
   const std::vector<Hypothesis> hypotheses{{of.map, 1.0}, {random_map(20, 40, 0.8, 5.0, 83), 1.0}};
-  of.contact.table = crooked_table();
-  std::vector<double>& rows = of.contact.table->log_likelihood;
-  const std::vector<double> first = rows;
-  rows.insert(rows.end(), first.rbegin(), first.rend());
+  of.contact.table = crooked_table_of_two();
   const BinLikelihood both(hypotheses, of.contact, of.lattice);
   const std::vector<BinBox> boxes{{.object = 1, .theta = 2, .y_count = 3, .x_count = 3},
                                   {.object = 0, .theta = 2, .y_count = 3, .x_count = 3},
@@ -257,20 +253,6 @@ TEST(BinLikelihood, HasTheSameBitsInEveryBoxWithEverySetOfInstructions) {
       expect_same_bits(of, fmt::format("{} elements, cells of {} mm", elements, cell_mm));
     }
   }
-}
-
-TEST(BinLikelihood, HasTheSameBitsOnThreads) {
-  const BinCase of = letter_case();
-  const BinLikelihood likelihood = likelihood_of(of);
-  // Planes are larger than a thread's task, the small boxes between them smaller.
-  std::vector<BinBox> boxes = planes(of.lattice);
-  for (int i = 0; i < 300; ++i) {
-    boxes.insert(boxes.end() - 1, {0, i % 3, i % 24, 1 + i % 7, i % 58, 5});
-  }
-  const auto on_threads = [&](int threads) {
-    return tbb::task_arena(threads).execute([&] { return evaluated(likelihood, of, boxes); });
-  };
-  EXPECT_EQ(on_threads(4), on_threads(1));
 }
 
 TEST(BinLikelihood, RefusesAMapThatIndicesDoNotReach) {

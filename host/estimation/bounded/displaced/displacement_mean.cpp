@@ -50,9 +50,6 @@ BlockRange blocks_taken(const Tap& tap, const BlockRun& run, const DisplacementM
 /// The least part of a tap's bilinear weights that lies inside the region, for any bin of a place.
 double weight_inside(int place, int bins, const Axis& axis, int moved, double fraction) {
   const int end = std::min((place + 1) * bins, axis.count);
-  if (place * bins + moved >= 0 && end + moved < axis.count) {
-    return (1.0 - fraction) + fraction;  // all bins of most places lie inside
-  }
   // It grows and then falls along the axis: least is that of the first or of the last.
   return std::min(part_inside(axis, place * bins + moved, fraction),
                   part_inside(axis, end - 1 + moved, fraction));

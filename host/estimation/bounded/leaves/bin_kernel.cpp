@@ -10,9 +10,8 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "estimation/bounded/leaves/bin_kernel-inl.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
-#include "estimation/bounded/leaves/patch_interpolation-inl.hpp"
-#include "estimation/bounded/leaves/reading_likelihood-inl.hpp"
 #include "model/vector_math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -179,27 +178,6 @@ constexpr double least_ratio = 0x1p-30;
 /// Stands for log 0: below all log odds.
 constexpr double log_zero = -1e38;
 
-/// See ReadingForm::rows.
-std::vector<double> rows_of(const LikelihoodTable& table) {
-  std::vector<double> rows;
-  rows.reserve(2 * table.log_likelihood.size());
-  const auto nodes = static_cast<std::ptrdiff_t>(table.nodes);
-  for (auto of = table.log_likelihood.begin(); of != table.log_likelihood.end(); of += nodes) {
-    rows.insert(rows.end(), of, of + nodes);
-    for (auto node = of; node + 1 != of + nodes; ++node) {
-      rows.push_back(node[1] - node[0]);
-    }
-    rows.push_back(0.0);
-  }
-  return rows;
-}
-
-/// Elements whose numerators, in [ratio, 2], and denominators, in [1, 2], a product takes before it
-/// could leave 2^+-1000. Each starts within [1, 2).
-int interval_of(double ratio) {
-  return static_cast<int>(std::min(64.0, 999.0 / std::max(1.0, -std::log2(ratio))));
-}
-
 }  // namespace
 
 MapPatches::MapPatches(const OccupancyGrid& map, double prior)
@@ -243,7 +221,7 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
     sets = from.sets();
     first_log_odds = from.first_log_odds;
     nodes_per_nat = static_cast<double>(nodes - 1) / (from.last_log_odds - from.first_log_odds);
-    rows = rows_of(from);
+    rows = from.log_likelihood;
     return;
   }
   const double floor = contact.gamma * contact.prior.value();
@@ -252,7 +230,9 @@ ReadingForm::ReadingForm(const ContactModel& contact) {
   ratio = floor / scale;
   if (ratio >= least_ratio) {
     log_ratio = std::log(ratio);
-    interval = interval_of(ratio);
+    // Numerators, in [ratio, 2], and denominators, in [1, 2], that a product takes before it could
+    // leave 2^+-1000. Each starts within [1, 2).
+    interval = static_cast<int>(std::min(64.0, 999.0 / std::max(1.0, -std::log2(ratio))));
     return;
   }
   kind = Kind::logs;

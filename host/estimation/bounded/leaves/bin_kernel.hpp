@@ -59,11 +59,10 @@ struct ReadingForm {
   /// @param contact resolved: with its prior
   explicit ReadingForm(const ContactModel& contact);
 
-  /// A table's values of an object's reading, [node]; behind them the differences to the next
-  /// node's value, 0 at the last.
+  /// A table's values of an object's reading, [node].
   const double* values(std::size_t object, Reading reading) const {
     const std::size_t row = (sets == 1 ? 0 : object) * readings + static_cast<std::size_t>(reading);
-    return rows.data() + 2 * row * nodes;
+    return rows.data() + row * nodes;
   }
 
   Kind kind = Kind::products;
@@ -78,7 +77,7 @@ struct ReadingForm {
   std::size_t nodes = 0;
   std::size_t readings = 0;
   std::size_t sets = 0;
-  std::vector<double> rows;  ///< [set, reading, values and differences, node]
+  std::vector<double> rows;  ///< [set, reading, node]
 };
 
 /// Most lanes of a vector. Lists that kernels read are padded to a multiple of it.

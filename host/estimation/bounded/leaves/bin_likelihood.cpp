@@ -8,6 +8,7 @@
 
 #include "estimation/bounded/displaced/undisplaced_bins.hpp"
 #include "estimation/parallel_for.hpp"
+#include "model/extremes.hpp"
 
 namespace palpate {
 
@@ -299,22 +300,20 @@ PlacedMap::PlacedMap(const OccupancyGrid& map, double prior, const PoseLattice& 
       reach_cells(lattice_cells + std::max(map.nx, map.ny) + 20.0),
       grid(reach_cells) {
   const double beyond = nodes.prior_log_odds();
-  double least = beyond;
-  double highest = beyond;
+  Extremes log_odds{beyond, beyond};
   const auto node = [&](int i, int j) {
     return i >= 0 && i < map.nx && j >= 0 && j < map.ny ? double{map.at(i, j)} : beyond;
   };
   for (int j = -1; j < map.ny; ++j) {
     for (int i = -1; i < map.nx; ++i) {
       const double here = node(i, j);
-      least = std::min(least, here);
-      highest = std::max(highest, here);
+      log_odds.include(here);
       steepest =
           std::max({steepest, std::abs(node(i + 1, j) - here), std::abs(node(i, j + 1) - here)});
     }
   }
-  largest = std::max(std::abs(least), std::abs(highest));
-  range = highest - least;
+  largest = log_odds.largest_magnitude();
+  range = log_odds.span();
 }
 
 double BinLikelihood::undisplaced_error(std::size_t object, const KnownElements& elements) const {
@@ -334,10 +333,11 @@ double BinLikelihood::undisplaced_error(std::size_t object, const KnownElements&
     double largest = 0.0;   // magnitude, in nats
     double steepest = 0.0;  // difference per nat of log odds
     for (std::size_t reading = 0; reading < form_.readings; ++reading) {
-      const double* of = form_.values(object, static_cast<Reading>(reading));
-      for (std::size_t i = 0; i < form_.nodes; ++i) {
+      const std::span of(form_.values(object, static_cast<Reading>(reading)), form_.nodes);
+      for (std::size_t i = 0; i < of.size(); ++i) {
+        const double next = of[std::min(i + 1, of.size() - 1)];
         largest = std::max(largest, std::abs(of[i]));
-        steepest = std::max(steepest, std::abs(of[form_.nodes + i]) * form_.nodes_per_nat);
+        steepest = std::max(steepest, std::abs(next - of[i]) * form_.nodes_per_nat);
       }
     }
     const double width = static_cast<double>(form_.nodes - 1) / form_.nodes_per_nat;

@@ -19,13 +19,13 @@ constexpr double margin = 0.01;
 
 /// The largest log-likelihood of a reading over an interval of log odds. Eq. 7 rises or falls with
 /// the log odds, and is largest at an end; a table is so at an end or at a node between.
-double largest_in(const MapSquares::Range& range, const ContactModel& contact, Reading reading,
+double largest_in(const Extremes& range, const ContactModel& contact, Reading reading,
                   std::size_t object) {
   const auto at = [&](double log_odds) {
     return contact.log_likelihood(reading, {log_odds}, object);
   };
   if (!contact.table) {
-    return at(reading == Reading::no_contact ? range.low : range.high);
+    return at(reading == Reading::no_contact ? range.least : range.most);
   }
   const LikelihoodTable& table = *contact.table;
   const std::size_t set = table.sets() == 1 ? 0 : object;
@@ -41,9 +41,9 @@ double largest_in(const MapSquares::Range& range, const ContactModel& contact, R
     const double place = (log_odds - table.first_log_odds) * nodes_per_nat;
     return static_cast<std::size_t>(std::clamp(place, 0.0, last) + 1.0 + margin);
   };
-  double highest = std::max(at(range.low), at(range.high));
-  for (std::size_t i = node_after(range.low, -rounding);
-       i < std::min(node_after(range.high, rounding), table.nodes); ++i) {
+  double highest = std::max(at(range.least), at(range.most));
+  for (std::size_t i = node_after(range.least, -rounding);
+       i < std::min(node_after(range.most, rounding), table.nodes); ++i) {
     highest = std::max(highest, nodes[i]);
   }
   return highest;
@@ -120,10 +120,11 @@ MapSquares map_squares(const OccupancyGrid& map, double prior_log_odds,
   squares.ranges.reserve(static_cast<std::size_t>(squares.nx) * squares.ny);
   for (int j = 0; j < squares.ny; ++j) {
     for (int i = 0; i < squares.nx; ++i) {
-      MapSquares::Range& range = squares.ranges.emplace_back();
+      constexpr double infinity = std::numeric_limits<double>::infinity();
+      Extremes& range = squares.ranges.emplace_back(Extremes{infinity, -infinity});
       for (int row = y.first[j]; row <= y.first[j + 1]; ++row) {
         for (int column = x.first[i]; column <= x.first[i + 1]; ++column) {
-          range.take_in(log_odds[static_cast<std::size_t>(row) * x.node.size() + column]);
+          range.include(log_odds[static_cast<std::size_t>(row) * x.node.size() + column]);
         }
       }
     }
@@ -138,7 +139,7 @@ SquarePenalties square_penalties(const MapSquares& squares, const ContactModel& 
   SquarePenalties penalties{.best = prior, .nx = squares.nx, .ny = squares.ny, .least = {}};
   std::vector<double> highest;
   highest.reserve(squares.ranges.size());
-  for (const MapSquares::Range& range : squares.ranges) {
+  for (const Extremes& range : squares.ranges) {
     highest.push_back(largest_in(range, contact, reading, object));
     penalties.best = std::max(penalties.best, highest.back());
   }
