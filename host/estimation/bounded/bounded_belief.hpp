@@ -166,7 +166,6 @@ class BoundedBelief {
 
   BoundedOptions options_;
   std::vector<Hypothesis> hypotheses_;
-  int threads_;
   mutable tbb::task_arena arena_;
   BinLikelihood likelihood_;
   SearchSpace space_;

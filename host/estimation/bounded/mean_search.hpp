@@ -42,8 +42,6 @@ class MeanSearch {
   std::optional<LogInterval> bounds(double least, const Deadline& deadline);
   /// Log of the share of the bins that count among all, by prior weight; 0 before bounds().
   double log_share() const { return log_share_; }
-  /// Host memory of what searches keep.
-  std::uint64_t bytes() const { return surveys_.capacity() * sizeof(Survey); }
 
  private:
   class Division;

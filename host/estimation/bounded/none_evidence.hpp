@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <functional>
 #include <span>
 #include <vector>
@@ -45,8 +44,6 @@ class NoneEvidence {
   /// bits do not depend on their number.
   /// @throws what the deadline's cancel point throws
   LogInterval bounds(const Enough& enough, const Deadline& deadline);
-  /// Host memory of what searches keep.
-  std::uint64_t bytes() const;
 
  private:
   /// What is known of one touch.

@@ -265,18 +265,6 @@ TEST(BoundedNone, IsBoundedAsCloselyAsTheEvidenceAndWithin0_3Nats) {
   }
 }
 
-TEST(BoundedNone, CountsTheMemoryThatItTakes) {
-  const auto bytes_of = [](const BoundedOptions& options) {
-    BoundedPosterior posterior(two_made_up(), options);
-    posterior.update(all_touches(random_recording(3, 36, 823)));
-    posterior.estimate();
-    return posterior.host_bytes();
-  };
-  // Of each touch, every object and theta has at least some numbers.
-  const auto planes = static_cast<std::uint64_t>(2 * small_options().lattice.theta_rad.count);
-  EXPECT_GT(bytes_of(with_none(1.0)), bytes_of(small_options()) + 3 * planes * sizeof(double));
-}
-
 TEST(BoundedNone, ShowsInTheIdentitiesWhereABudgetLeftIt) {
   BoundedOptions options = with_none(3.0, 90, 90, 20);
   const Recording recording = random_recording(1, 36, 819);

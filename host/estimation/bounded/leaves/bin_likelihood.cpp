@@ -128,8 +128,6 @@ BinLikelihood::BinLikelihood(std::span<const Hypothesis> hypotheses, const Conta
   }
 }
 
-void BinLikelihood::move_pivot(const glm::dvec2& pivot_mm) { lattice_.pivot_mm = pivot_mm; }
-
 void BinLikelihood::evaluate_on_this_thread(std::span<const BinBox> boxes,
                                             const KnownElements& elements,
                                             double* log_likelihood) const {

@@ -49,7 +49,7 @@ class BinLikelihood {
   /// @throws Error where a map has too many cells
   BinLikelihood(std::span<const Hypothesis> hypotheses, const ContactModel& contact,
                 const PoseLattice& lattice, const DisplacementSd& touch_sd = {});
-  void move_pivot(const glm::dvec2& pivot_mm);
+  void move_pivot(const glm::dvec2& pivot_mm) { lattice_.pivot_mm = pivot_mm; }
 
   /// Log-likelihood of the elements at every bin in nats, boxes one after another, [y, x] in each.
   /// On the threads of the caller's TBB arena. Fastest where boxes of one object and theta stand

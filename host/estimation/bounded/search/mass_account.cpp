@@ -132,8 +132,6 @@ std::vector<double> MassAccount::droppable_evidence(double tolerance) const {
   return largest;
 }
 
-double MassAccount::dropped_share() const { return std::exp(all_dropped_.log() - log_total_); }
-
 SearchResult MassAccount::result() const {
   SearchResult result{.mass = {},
                       .best_object = mode_object_,
@@ -165,10 +163,6 @@ std::size_t UnsettledMass::slot(double bound) const {
   const double below = (largest_ - bound) / slot_nats_;
   return below >= static_cast<double>(slots - 1) ? slots - 1
                                                  : static_cast<std::size_t>(std::max(below, 0.0));
-}
-
-double UnsettledMass::upper_edge(std::size_t slot) const {
-  return largest_ - static_cast<double>(slot) * slot_nats_;
 }
 
 template <typename Visit>

@@ -74,7 +74,9 @@ class UnsettledMass {
   Reached add_up(std::size_t hypothesis) const;
   std::size_t droppable_from(const Hypotheses& of, double log_allowance) const;
   /// The bound that no tile in a slot exceeds, in nats.
-  double upper_edge(std::size_t slot) const;
+  double upper_edge(std::size_t slot) const {
+    return largest_ - static_cast<double>(slot) * slot_nats_;
+  }
   /// What a bin counts for, that many slots further up.
   double decay(std::size_t slots_up) const {
     return slots_up < decay_.size() ? decay_[slots_up]
@@ -121,7 +123,7 @@ class MassAccount {
   /// part of the total.
   std::vector<std::size_t> droppable_from(const UnsettledMass& tiles, double tolerance) const;
   /// What was dropped so far as a part of the total, at most.
-  double dropped_share() const;
+  double dropped_share() const { return std::exp(all_dropped_.log() - log_total_); }
   /// Lower bound of the log of the total mass, in nats.
   double log_total() const { return log_total_; }
   /// What the best bin has at least, with the prior weight, in nats.

@@ -151,9 +151,8 @@ constexpr std::size_t slack = 64;
 
 void place_windows(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
                    WindowPlaces& placed) {
-  const std::size_t count = elements.from_pivot_mm.size();
   for (std::vector<std::int32_t>* list : {&placed.plane, &placed.column, &placed.row}) {
-    list->resize(count + slack);
+    list->resize(elements.from_pivot_mm.size() + slack);
   }
   HWY_DYNAMIC_DISPATCH(PlaceWindows)(elements.from_pivot_mm, place, shape, placed);
 }
