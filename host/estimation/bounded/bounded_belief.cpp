@@ -203,12 +203,8 @@ BinBelief BoundedBelief::bins() {
                 .objects = {},
                 .visit = [this](std::span<const int> objects, const BlockChoice& /*all*/,
                                 const BinVisitor& visitor) {
-                  std::vector<std::uint8_t> asked(hypotheses_.size());
-                  for (const int object : objects) {
-                    asked[object] = 1;
-                  }
                   visit([&](const BinBox& box, std::span<const double> log_likelihood) {
-                    if (asked[box.object] != 0) {
+                    if (std::ranges::find(objects, box.object) != objects.end()) {
                       visitor(box, log_likelihood);
                     }
                   });

@@ -27,11 +27,9 @@ constexpr double most_bins = 4e18;
 
 /// Most bins along an axis within a batch of tiles.
 double bins_in_batch(const Axis& axis, const TileSize& size, double cell_mm) {
-  double bins = batch_side * size.bins;
-  if (size.bins == 0) {
-    bins =
-        axis.count > 1 ? std::floor(batch_side * size.cells() * cell_mm / axis.step()) + 1.0 : 1.0;
-  }
+  const double bins = size.bins > 0
+                          ? batch_side * size.bins
+                          : std::floor(batch_side * size.cells() * cell_mm / axis.step()) + 1.0;
   return std::min<double>(bins, axis.count);
 }
 

@@ -239,7 +239,7 @@ std::size_t TileBounds::bytes() const {
   std::size_t bytes = 0;
   for (const std::vector<WindowTable>& level : tables_) {
     for (const WindowTable& table : level) {
-      bytes += table.bytes();
+      bytes += table.entries.capacity() * sizeof(std::uint16_t);
     }
   }
   return bytes;

@@ -72,7 +72,6 @@ struct WindowTable {
   /// Entry of a plane at which a window stands that begins at square 0 of phase 0: smaller windows
   /// lie below the map.
   static constexpr int margin = batch_side + 1;
-  std::size_t bytes() const { return entries.capacity() * sizeof(std::uint16_t); }
 };
 
 /// @param side a power of two
