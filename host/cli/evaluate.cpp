@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -56,16 +57,20 @@ std::string class_name(const ClassScores& scores) {
   return scores.label + (scores.known ? "" : " (unknown)");
 }
 
-/// The wrong answers, the most frequent first.
+/// The wrong answers, the most frequent first: "3 A, 1 (none)".
 std::string taken_for(const ClassScores& scores, const std::vector<std::string>& answers) {
   const std::string_view right = scores.known ? std::string_view(scores.label) : none_label;
-  std::vector<std::pair<std::string, std::size_t>> wrong;
+  std::multimap<std::size_t, std::string, std::greater<>> wrong;  // [how often]
   for (std::size_t k = 0; k < answers.size(); ++k) {
     if (scores.taken[k] > 0 && answers[k] != right) {
-      wrong.emplace_back(answers[k], scores.taken[k]);
+      wrong.emplace(scores.taken[k], answers[k]);
     }
   }
-  return tally(std::move(wrong));
+  std::string text;
+  for (const auto& [count, answer] : wrong) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, answer);
+  }
+  return text;
 }
 
 std::string class_table(const Evaluation& evaluation) {
@@ -178,11 +183,9 @@ void add_evaluate(CLI::App& app) {
       "class, whose right answer is \"(none)\"; the area under the curve says how well unknown "
       "classes are told from known ones",
       evaluate_results);
-  command
-      ->add_option("RESULTS", options->results,
-                   "JSON files of palpate recognize, files with one such record a line, folders of "
-                   "palpate batch, or folders of *.json. Records without a true label are left out")
-      ->required();
+  add_required(*command, "RESULTS", options->results,
+               "JSON files of palpate recognize, files with one such record a line, folders of "
+               "palpate batch, or folders of *.json. Records without a true label are left out");
   command->add_option("--json", options->json, "Write all numbers as JSON; - is standard output");
 }
 

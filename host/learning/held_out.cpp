@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "estimation/log_sum.hpp"
-#include "recognition/object_fit.hpp"
+#include "recognition/label_probability.hpp"
 
 namespace palpate {
 

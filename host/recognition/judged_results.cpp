@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -23,29 +21,34 @@ namespace fs = std::filesystem;
 
 constexpr const char* remedy = "give what palpate recognize (`json`) or palpate batch wrote";
 
-/// A field that no evaluation reads, but that people look at.
-struct ShownField {
-  const char* object;  ///< that holds it; "": the record
-  const char* key;
-  bool (*fits)(const Json& value);
-  const char* words;
-};
-
 bool is_text(const Json& value) { return value.is_string(); }
 bool is_truth(const Json& value) { return value.is_boolean(); }
+bool is_number(const Json& value) { return value.is_number(); }
+bool is_object(const Json& value) { return value.is_object(); }
 bool is_count(const Json& value) {
   return value.is_number_unsigned() && value.get<std::uint64_t>() <= 1'000'000'000;
 }
 
-constexpr ShownField shown_fields[] = {{"", "recording", is_text, "a name"},
-                                       {"", "error", is_text, "a sentence"},
-                                       {"", "touches", is_count, "a whole number from 0"},
-                                       {"", "unknown", is_count, "a whole number from 0"},
-                                       {"", "touch", is_count, "a whole number from 0"},
-                                       {"mode", "map", is_text, "a file"},
-                                       {"mode", "mirrored", is_truth, "true or false"},
-                                       {"fit", "verdict", is_text, "a word"},
-                                       {"decision", "act", is_truth, "true or false"}};
+/// What a field must be.
+struct FieldKind {
+  bool (*fits)(const Json& value);
+  const char* words;
+};
+constexpr FieldKind a_label{is_text, "a label"};
+constexpr FieldKind a_number{is_number, "a number"};
+constexpr FieldKind a_count{is_count, "a whole number from 0"};
+constexpr FieldKind a_truth{is_truth, "true or false"};
+
+/// Fields that no evaluation reads, but that people look at.
+constexpr std::pair<const char*, FieldKind> shown_fields[] = {{"recording", {is_text, "a name"}},
+                                                              {"error", {is_text, "a sentence"}},
+                                                              {"touches", a_count},
+                                                              {"unknown", a_count},
+                                                              {"touch", a_count},
+                                                              {"mode.map", {is_text, "a file"}},
+                                                              {"mode.mirrored", a_truth},
+                                                              {"fit.verdict", {is_text, "a word"}},
+                                                              {"decision.act", a_truth}};
 
 constexpr int most_nested = 64;  // a record is copied and written level by level
 
@@ -67,17 +70,20 @@ class RecordReader {
   }
 
   /// Whether the unknown could not be recognised, which palpate batch tells.
-  bool failed() const { return find(record_, "error") != nullptr && !record_.contains("best"); }
+  bool failed() const { return find("error") != nullptr && !record_.contains("best"); }
 
   /// None where the true label is not known. The other fields are checked all the same.
   std::optional<JudgedRecord> read() const {
-    JudgedRecord judged{.truth = true_label(),
-                        .best = text("best", find(record_, "best")),
+    JudgedRecord judged{.truth = find("truth") == nullptr ? "" : text("truth.object"),
+                        .best = text("best"),
                         .identity = identity(),
-                        .none = probability("none"),
-                        .fit_z = fit_z(),
+                        .none = {},
+                        .fit_z = number("fit.z"),
                         .error_mm = error("error_mm"),
                         .refined_error_mm = error("refined_error_mm")};
+    if (const Json* none = find("none")) {
+      judged.none = probability("none", *none);
+    }
     if (!judged.identity.contains(judged.best)) {
       refuse_field("best", "'{}' has no probability in 'identity'; {}", judged.best, remedy);
     }
@@ -88,16 +94,9 @@ class RecordReader {
     if (!is_nested_within(record_, most_nested)) {
       refuse(file_, "record {} is nested more than {} deep; {}", index_, most_nested, remedy);
     }
-    for (const auto& [object, key, fits, words] : shown_fields) {
-      const bool inside = *object != '\0';
-      const Json* of = inside ? find(record_, object) : &record_;
-      if (of != nullptr && !of->is_object()) {
-        refuse_field(object, "is {}, not an object; {}", of->type_name(), remedy);
-      }
-      const Json* value = of == nullptr ? nullptr : find(*of, key);
-      if (value != nullptr && !fits(*value)) {
-        refuse_field(inside ? fmt::format("{}.{}", object, key) : key, "is {}, not {}; {}",
-                     value->is_number() ? value->dump() : value->type_name(), words, remedy);
+    for (const auto& [field, kind] : shown_fields) {
+      if (const Json* value = find(field)) {
+        require(field, value, kind);
       }
     }
   }
@@ -110,62 +109,56 @@ class RecordReader {
     refuse(file_, "record {}: field '{}' {}", index_, field, fmt::format(message, parts...));
   }
 
-  /// The field; null where it is missing or null, as numbers that are not finite are in JSON.
-  const Json* find(const Json& object, const char* key) const {
-    const auto found = object.find(key);
-    return found == object.end() || found->is_null() ? nullptr : &*found;
+  const Json& require(const std::string& field, const Json* value, const FieldKind& kind) const {
+    if (value == nullptr || !kind.fits(*value)) {
+      refuse_field(field, "is {}, not {}; {}",
+                   value == nullptr     ? "missing"
+                   : value->is_number() ? value->dump()
+                                        : value->type_name(),
+                   kind.words, remedy);
+    }
+    return *value;
   }
 
-  std::string text(const char* field, const Json* found) const {
-    if (found == nullptr || !found->is_string()) {
-      refuse_field(field, "is {}, not a label; {}",
-                   found == nullptr ? "missing" : found->type_name(), remedy);
-    }
-    return found->get<std::string>();
+  /// The field, or that of an object in the record, as "fit.z"; null where it is missing or null,
+  /// as numbers that are not finite are in JSON.
+  const Json* find(const std::string& field) const {
+    const auto member = [](const Json& object, const std::string& key) {
+      const auto found = object.find(key);
+      return found == object.end() || found->is_null() ? nullptr : &*found;
+    };
+    const std::size_t dot = field.find('.');
+    const std::string outer = field.substr(0, dot);
+    const Json* found = member(record_, outer);
+    return found == nullptr || dot == field.npos
+               ? found
+               : member(require(outer, found, {is_object, "an object"}), field.substr(dot + 1));
   }
 
-  double number(const std::string& field, const Json& value) const {
-    if (!value.is_number()) {
-      refuse_field(field, "is {}, not a number; {}", value.type_name(), remedy);
-    }
-    return value.get<double>();
+  std::string text(const char* field) const {
+    return require(field, find(field), a_label).get<std::string>();
+  }
+
+  std::optional<double> number(const char* field) const {
+    const Json* found = find(field);
+    return found == nullptr ? std::nullopt
+                            : std::optional(require(field, found, a_number).get<double>());
   }
 
   double probability(const std::string& field, const Json& value) const {
     constexpr double rounding = 1e-9;  // of a sum over the maps of a label
-    const double p = number(field, value);
+    const auto p = require(field, &value, a_number).get<double>();
     if (!(p >= 0.0 && p <= 1.0 + rounding)) {
       refuse_field(field, "= {}, not a probability; give 0 to 1", p);
     }
     return std::min(p, 1.0);
   }
 
-  std::optional<double> probability(const char* key) const {
-    const Json* found = find(record_, key);
-    return found == nullptr ? std::nullopt : std::optional(probability(key, *found));
-  }
-
-  std::string true_label() const {
-    const Json* truth = find(record_, "truth");
-    if (truth == nullptr) {
-      return "";
-    }
-    if (!truth->is_object()) {
-      refuse_field("truth", "is {}, not an object with the true label 'object'; {}",
-                   truth->type_name(), remedy);
-    }
-    return text("truth.object", find(*truth, "object"));
-  }
-
   std::map<std::string, double> identity() const {
-    const Json* found = find(record_, "identity");
-    if (found == nullptr || !found->is_object()) {
-      refuse_field("identity", "is {}, not {{label: probability}}; {}",
-                   found == nullptr ? "missing" : found->type_name(), remedy);
-    }
     std::map<std::string, double> result;
     double sum = 0.0;
-    for (const auto& [label, value] : found->items()) {
+    const Json& found = require("identity", find("identity"), {is_object, "{label: probability}"});
+    for (const auto& [label, value] : found.items()) {
       sum += result[label] = probability("identity." + label, value);
     }
     constexpr double tolerance = 0.01;  // of numbers that another program has rounded
@@ -175,26 +168,10 @@ class RecordReader {
     return result;
   }
 
-  std::optional<double> fit_z() const {
-    const Json* fit = find(record_, "fit");
-    if (fit == nullptr) {
-      return {};
-    }
-    if (!fit->is_object()) {
-      refuse_field("fit", "is {}, not an object with 'z'; {}", fit->type_name(), remedy);
-    }
-    const Json* z = find(*fit, "z");
-    return z == nullptr ? std::nullopt : std::optional(number("fit.z", *z));
-  }
-
-  std::optional<double> error(const char* key) const {
-    const Json* found = find(record_, key);
-    if (found == nullptr) {
-      return {};
-    }
-    const double error_mm = number(key, *found);
-    if (error_mm < 0.0) {
-      refuse_field(key, "= {} mm; give at least 0", error_mm);
+  std::optional<double> error(const char* field) const {
+    const std::optional<double> error_mm = number(field);
+    if (error_mm.value_or(0.0) < 0.0) {
+      refuse_field(field, "= {} mm; give at least 0", *error_mm);
     }
     return error_mm;
   }
@@ -243,16 +220,6 @@ Json parse(const fs::path& file, const std::string& bytes) {
   return json;
 }
 
-std::string read_bytes(const fs::path& file) {
-  require_readable(file);
-  std::ifstream stream(file, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream) {
-    refuse(file, "cannot be read; copy it again");
-  }
-  return bytes;
-}
-
 /// The chunks of a folder of palpate batch, which has a task, or the *.json of another one, by
 /// name.
 std::vector<fs::path> files_of(const fs::path& results) {
@@ -260,20 +227,13 @@ std::vector<fs::path> files_of(const fs::path& results) {
   const bool batch = fs::is_regular_file(results / "task.ndjson", error);
   const fs::path folder = batch ? results / "chunks" : results;
   const char* const extension = batch ? ".ndjson" : ".json";
-  const fs::directory_iterator entries(folder, error);
-  if (error) {
-    refuse(folder, "cannot be read: {}; check its permissions", error.message());
-  }
-  std::vector<fs::path> files;
-  for (const auto& entry : entries) {
-    if (entry.path().extension() == extension && !entry.is_directory(error)) {
-      files.push_back(entry.path());
-    }
-  }
+  std::vector<fs::path> files = paths_in(folder);
+  std::erase_if(files, [&](const fs::path& file) {
+    return file.extension() != extension || fs::is_directory(file, error);
+  });
   if (files.empty()) {
     refuse(folder, "a folder without *{}; {}", extension, remedy);
   }
-  std::sort(files.begin(), files.end());
   return files;
 }
 
