@@ -53,10 +53,6 @@ std::string reliability_table(const Scores& scores) {
   return table.text();
 }
 
-std::string class_name(const ClassScores& scores) {
-  return scores.label + (scores.known ? "" : " (unknown)");
-}
-
 /// The wrong answers, the most frequent first: "3 A, 1 (none)".
 std::string taken_for(const ClassScores& scores, const std::vector<std::string>& answers) {
   const std::string_view right = scores.known ? std::string_view(scores.label) : none_label;
@@ -81,7 +77,7 @@ std::string class_table(const Evaluation& evaluation) {
                    {"95 % interval", true},
                    {"taken for"}});
   for (const ClassScores& scores : evaluation.classes) {
-    table.add({class_name(scores), fmt::format("{}", scores.records),
+    table.add({scores.label + (scores.known ? "" : " (unknown)"), fmt::format("{}", scores.records),
                fmt::format("{}", scores.right), percent(scores.accuracy()),
                range_words(scores.interval()), taken_for(scores, evaluation.answers)});
   }
@@ -165,8 +161,9 @@ void evaluate_results(const EvaluateArguments& options) {
   const JudgedResults results = read_results(files);
   const Evaluation evaluation = evaluate(results, options.results.front());
   std::ranges::for_each(folders, tell_missing);
-  if (const std::string failed = failed_words(results); !failed.empty()) {
-    tell_on_stderr(failed);
+  if (results.failed > 0) {
+    tell_on_stderr(count_of(results.failed, "unknown", "unknowns") +
+                   " could not be recognised, and left out; their records say why");
   }
   const std::string json = text_of(to_json(evaluation, results), 2);
   give_result(options.json, json, evaluation_text(evaluation, results.without_truth));

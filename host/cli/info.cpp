@@ -20,12 +20,6 @@ namespace palpate::cli {
 
 namespace {
 
-std::string table_text(const LearnedTable& table) {
-  return fmt::format("{} levels over {}; {} object(s) with numbers of their own", table.levels(),
-                     table.layer.of == MapLayer::log_odds ? "log odds" : "mean levels",
-                     table.objects.size());
-}
-
 /// Prints a line of what a file holds.
 template <typename... Values>
 void print_row(std::string_view name, fmt::format_string<const Values&...> words,
@@ -54,7 +48,13 @@ void print_sensor_model(const std::string& path) {
     print_row("touch sd", "{:.4g} mm, {:.4g} deg", sensor.touch_sd.mm,
               degrees(sensor.touch_sd.rad));
   }
-  print_row("likelihood", "{}", sensor.table ? "table of " + table_text(*sensor.table) : "Eq. 7");
+  if (const auto& table = sensor.table) {
+    print_row("likelihood", "table of {} levels over {}; {} object(s) with numbers of their own",
+              table->levels(), table->layer.of == MapLayer::log_odds ? "log odds" : "mean levels",
+              table->objects.size());
+  } else {
+    print_row("likelihood", "Eq. 7");
+  }
   print_row("temperature", "{}",
             sensor.temperature_growth > 0.0
                 ? fmt::format("{:.4g}, and {:.4g} more for every further touch", sensor.temperature,

@@ -43,17 +43,6 @@ struct LiveArguments : SensorArguments {
   PageAddress page;
 };
 
-/// Tells on standard error what has changed of the sensor that a person has to act on.
-void tell_change(const LiveState& before, const LiveState& now) {
-  if (now.taring && !before.taring) {
-    tell_on_stderr("taring: do not touch the array");
-  }
-  if (now.gone != before.gone) {
-    tell_on_stderr(now.gone ? "the board is unplugged; plug it in again to go on"
-                            : "the board is back");
-  }
-}
-
 /// A file to which lines are added; other programs can read each line at once.
 class LineFile {
  public:
@@ -241,7 +230,13 @@ void live(const LiveArguments& options) {
       std::this_thread::sleep_for(40ms);
     }
     const LiveState before = std::exchange(state, recognition.state());
-    tell_change(before, state);
+    if (state.taring && !before.taring) {
+      tell_on_stderr("taring: do not touch the array");
+    }
+    if (state.gone != before.gone) {
+      tell_on_stderr(state.gone ? "the board is unplugged; plug it in again to go on"
+                                : "the board is back");
+    }
     if (page) {
       const std::lock_guard lock(mutex);
       page->update(state, last_finding);

@@ -151,8 +151,8 @@ std::string symmetries(const std::vector<RecognitionRecord>& records, const Reco
   std::string text;
   for (const auto& [label, n] : symmetric) {
     text += fmt::format(
-        "{} looks the same after {}, as far as the touches tell: its theta is given {}\n",
-        printable(label), n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
+        "{} looks the same after {}: its theta is given {}\n", printable(label),
+        n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
         n == 0 ? "as 0" : fmt::format("from {:.4g} to {:.4g} deg", -180.0 / n, 180.0 / n));
   }
   return text;

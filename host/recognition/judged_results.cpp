@@ -16,22 +16,22 @@ namespace palpate {
 
 namespace {
 
-using Json = nlohmann::json;
+using Parsed = nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr const char* remedy = "give what palpate recognize (`json`) or palpate batch wrote";
 
-bool is_text(const Json& value) { return value.is_string(); }
-bool is_truth(const Json& value) { return value.is_boolean(); }
-bool is_number(const Json& value) { return value.is_number(); }
-bool is_object(const Json& value) { return value.is_object(); }
-bool is_count(const Json& value) {
+bool is_text(const Parsed& value) { return value.is_string(); }
+bool is_truth(const Parsed& value) { return value.is_boolean(); }
+bool is_number(const Parsed& value) { return value.is_number(); }
+bool is_object(const Parsed& value) { return value.is_object(); }
+bool is_count(const Parsed& value) {
   return value.is_number_unsigned() && value.get<std::uint64_t>() <= 1'000'000'000;
 }
 
 /// What a field must be.
 struct FieldKind {
-  bool (*fits)(const Json& value);
+  bool (*fits)(const Parsed& value);
   const char* words;
 };
 constexpr FieldKind a_label{is_text, "a label"};
@@ -52,9 +52,9 @@ constexpr std::pair<const char*, FieldKind> shown_fields[] = {{"recording", {is_
 
 constexpr int most_nested = 64;  // a record is copied and written level by level
 
-bool is_nested_within(const Json& value, int levels) {
+bool is_nested_within(const Parsed& value, int levels) {
   return !value.is_structured() ||
-         (levels > 0 && std::ranges::all_of(value, [levels](const Json& part) {
+         (levels > 0 && std::ranges::all_of(value, [levels](const Parsed& part) {
             return is_nested_within(part, levels - 1);
           }));
 }
@@ -62,7 +62,7 @@ bool is_nested_within(const Json& value, int levels) {
 /// One record, and the words that name it in a message.
 class RecordReader {
  public:
-  RecordReader(const fs::path& file, std::size_t index, const Json& record)
+  RecordReader(const fs::path& file, std::size_t index, const Parsed& record)
       : file_(file), index_(index), record_(record) {
     if (!record.is_object()) {
       refuse(file, "record {} is no JSON object but {}; {}", index, record.type_name(), remedy);
@@ -81,7 +81,7 @@ class RecordReader {
                         .fit_z = number("fit.z"),
                         .error_mm = error("error_mm"),
                         .refined_error_mm = error("refined_error_mm")};
-    if (const Json* none = find("none")) {
+    if (const Parsed* none = find("none")) {
       judged.none = probability("none", *none);
     }
     if (!judged.identity.contains(judged.best)) {
@@ -95,7 +95,7 @@ class RecordReader {
       refuse(file_, "record {} is nested more than {} deep; {}", index_, most_nested, remedy);
     }
     for (const auto& [field, kind] : shown_fields) {
-      if (const Json* value = find(field)) {
+      if (const Parsed* value = find(field)) {
         require(field, value, kind);
       }
     }
@@ -109,7 +109,8 @@ class RecordReader {
     refuse(file_, "record {}: field '{}' {}", index_, field, fmt::format(message, parts...));
   }
 
-  const Json& require(const std::string& field, const Json* value, const FieldKind& kind) const {
+  const Parsed& require(const std::string& field, const Parsed* value,
+                        const FieldKind& kind) const {
     if (value == nullptr || !kind.fits(*value)) {
       refuse_field(field, "is {}, not {}; {}",
                    value == nullptr     ? "missing"
@@ -122,14 +123,14 @@ class RecordReader {
 
   /// The field, or that of an object in the record, as "fit.z"; null where it is missing or null,
   /// as numbers that are not finite are in JSON.
-  const Json* find(const std::string& field) const {
-    const auto member = [](const Json& object, const std::string& key) {
+  const Parsed* find(const std::string& field) const {
+    const auto member = [](const Parsed& object, const std::string& key) {
       const auto found = object.find(key);
       return found == object.end() || found->is_null() ? nullptr : &*found;
     };
     const std::size_t dot = field.find('.');
     const std::string outer = field.substr(0, dot);
-    const Json* found = member(record_, outer);
+    const Parsed* found = member(record_, outer);
     return found == nullptr || dot == field.npos
                ? found
                : member(require(outer, found, {is_object, "an object"}), field.substr(dot + 1));
@@ -140,12 +141,12 @@ class RecordReader {
   }
 
   std::optional<double> number(const char* field) const {
-    const Json* found = find(field);
+    const Parsed* found = find(field);
     return found == nullptr ? std::nullopt
                             : std::optional(require(field, found, a_number).get<double>());
   }
 
-  double probability(const std::string& field, const Json& value) const {
+  double probability(const std::string& field, const Parsed& value) const {
     constexpr double rounding = 1e-9;  // of a sum over the maps of a label
     const auto p = require(field, &value, a_number).get<double>();
     if (!(p >= 0.0 && p <= 1.0 + rounding)) {
@@ -157,7 +158,8 @@ class RecordReader {
   std::map<std::string, double> identity() const {
     std::map<std::string, double> result;
     double sum = 0.0;
-    const Json& found = require("identity", find("identity"), {is_object, "{label: probability}"});
+    const Parsed& found =
+        require("identity", find("identity"), {is_object, "{label: probability}"});
     for (const auto& [label, value] : found.items()) {
       sum += result[label] = probability("identity." + label, value);
     }
@@ -178,19 +180,19 @@ class RecordReader {
 
   const fs::path& file_;
   std::size_t index_;
-  const Json& record_;
+  const Parsed& record_;
 };
 
 /// One JSON value a line; blank lines are passed over.
-Json parse_lines(const fs::path& file, std::string_view bytes) {
-  Json records = Json::array();
+Parsed parse_lines(const fs::path& file, std::string_view bytes) {
+  Parsed records = Parsed::array();
   for (std::size_t line = 1; !bytes.empty(); ++line) {
     const std::string_view text = bytes.substr(0, bytes.find('\n'));
     bytes.remove_prefix(std::min(text.size() + 1, bytes.size()));
     if (text.find_first_not_of(" \t\r") == text.npos) {
       continue;
     }
-    records.push_back(Json::parse(text, nullptr, false));
+    records.push_back(Parsed::parse(text, nullptr, false));
     if (records.back().is_discarded()) {
       refuse(file, "line {} (record {}) is not JSON; {}", line, records.size() - 1, remedy);
     }
@@ -198,21 +200,21 @@ Json parse_lines(const fs::path& file, std::string_view bytes) {
   return records;
 }
 
-Json parse(const fs::path& file, const std::string& bytes) {
+Parsed parse(const fs::path& file, const std::string& bytes) {
   const bool lines = bytes.find_first_of('{') == bytes.find_first_not_of(" \t\r\n");
-  Json json;
+  Parsed json;
   try {
-    json = Json::parse(bytes);
-  } catch (const Json::parse_error& error) {
+    json = Parsed::parse(bytes);
+  } catch (const Parsed::parse_error& error) {
     if (lines) {  // a record ends with its line
       return parse_lines(file, bytes);
     }
     refuse(file, "is not JSON at byte {}; {}", error.byte, remedy);
-  } catch (const Json::out_of_range&) {
+  } catch (const Parsed::out_of_range&) {
     refuse(file, "holds a number that is too large for JSON; {}", remedy);
   }
   if (json.is_object()) {
-    return Json::array({std::move(json)});
+    return Parsed::array({std::move(json)});
   }
   if (!json.is_array()) {
     refuse(file, "holds {}, not an array of records; {}", json.type_name(), remedy);
@@ -258,7 +260,7 @@ std::vector<fs::path> result_files(std::span<const std::string> arguments) {
 }
 
 void add_records(const fs::path& file, const std::string& text, JudgedResults& results) {
-  const Json records = parse(file, text);
+  const Parsed records = parse(file, text);
   for (std::size_t i = 0; i < records.size(); ++i) {
     const RecordReader reader(file, i, records[i]);
     if (reader.failed()) {
@@ -271,8 +273,8 @@ void add_records(const fs::path& file, const std::string& text, JudgedResults& r
   }
 }
 
-std::vector<Json> records_in(const fs::path& file) {
-  const Json records = parse(file, read_bytes(file));
+std::vector<Parsed> records_in(const fs::path& file) {
+  const Parsed records = parse(file, read_bytes(file));
   for (std::size_t i = 0; i < records.size(); ++i) {
     const RecordReader reader(file, i, records[i]);
     reader.require_shown_fields();
@@ -299,14 +301,6 @@ Evaluation evaluate(const JudgedResults& results, const fs::path& source) {
            results.without_truth);
   }
   return evaluate(results.records);
-}
-
-std::string failed_words(const JudgedResults& results) {
-  return results.failed == 0
-             ? ""
-             : fmt::format(
-                   "{} unknown{} could not be recognised, and left out; their records say why",
-                   results.failed, results.failed == 1 ? "" : "s");
 }
 
 }  // namespace palpate

@@ -18,23 +18,6 @@ using namespace std::chrono_literals;
 // A simulation at full speed would fill the memory, and finish() would have to use all of them.
 constexpr std::size_t most_jobs = 64;
 
-/// Signals are for the thread that can end the others: a thread that is started meanwhile leaves
-/// them all to it.
-class SignalsElsewhere {
- public:
-  SignalsElsewhere() {
-    sigset_t all;
-    ::sigfillset(&all);
-    ::pthread_sigmask(SIG_SETMASK, &all, &before_);
-  }
-  ~SignalsElsewhere() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  SignalsElsewhere(const SignalsElsewhere&) = delete;
-  SignalsElsewhere& operator=(const SignalsElsewhere&) = delete;
-
- private:
-  sigset_t before_;
-};
-
 }  // namespace
 
 LiveRecognition::LiveRecognition(Sensor& sensor, std::vector<glm::dvec2> elements_mm,
@@ -48,7 +31,6 @@ LiveRecognition::LiveRecognition(Sensor& sensor, std::vector<glm::dvec2> element
       task_(task),
       options_(options),
       on_touch_(std::move(on_touch)) {
-  const SignalsElsewhere block;
   reader_ = std::thread([this] { guard(&LiveRecognition::read); });
   believer_ = std::thread([this] { guard(&LiveRecognition::believe); });
 }
@@ -66,6 +48,9 @@ LiveRecognition::~LiveRecognition() {
 }
 
 void LiveRecognition::guard(void (LiveRecognition::*work)()) {
+  sigset_t all;  // signals are for the thread that can end this one
+  ::sigfillset(&all);
+  ::pthread_sigmask(SIG_SETMASK, &all, nullptr);
   try {
     (this->*work)();
   } catch (...) {

@@ -155,8 +155,9 @@ void doubt_places(const Recogniser& recogniser, const Estimate& estimate,
   const bool all_after_a_move =
       placement && placement->moved_after + unlike.size() == touches.size();
   if (placement && (unlike.empty() || all_after_a_move)) {
-    step.decision = {false, placement_words(*placement, task)};
-    step.warnings.push_back(placement_warning(*placement, task));
+    const auto [finding, remedy] = words_of(*placement, task);
+    step.decision = {false, finding};
+    step.warnings.push_back(finding + ": " + remedy);
   } else if (!unlike.empty()) {
     step.warnings.push_back(unlike_words(unlike, task, step));
     if (placement) {

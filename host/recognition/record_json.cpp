@@ -92,20 +92,21 @@ Json unknown_to_json(const Evaluation& evaluation) {
 
 Json to_json(const Median& median) { return {{"records", median.count}, {"median", median.value}}; }
 
-}  // namespace
-
-std::string verdict_text(Verdict verdict) {
-  return verdict == Verdict::fits       ? "fits"
-         : verdict == Verdict::doubtful ? "doubtful"
-                                        : "does not fit";
-}
-
+/// The truth as it was given.
 Json truth_to_json(const PartialTruth& truth) {
   Json json{{"object", truth.label}};
   if (truth.T_object_robot) {
     json["T_robot_object"] = to_json(inverse(*truth.T_object_robot));
   }
   return json;
+}
+
+}  // namespace
+
+std::string verdict_text(Verdict verdict) {
+  return verdict == Verdict::fits       ? "fits"
+         : verdict == Verdict::doubtful ? "doubtful"
+                                        : "does not fit";
 }
 
 Json to_json(const RecognitionStep& step, const RecognitionTask& task, OptionWords words) {

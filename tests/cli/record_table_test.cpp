@@ -111,8 +111,8 @@ TEST(ResultTable, SaysThatTurnsCountAsEqual) {
   RecognitionRecord folded = record;
   folded.trace.back().symmetry = 2;
   EXPECT_TRUE(result_table({record, folded, folded}, sample_task())
-                  .ends_with("  31.51\nA looks the same after every 1/2 of a turn, as far as the "
-                             "touches tell: its theta is given from -90 to 90 deg\n"));
+                  .ends_with("  31.51\nA looks the same after every 1/2 of a turn: its theta is "
+                             "given from -90 to 90 deg\n"));
 }
 
 TEST(ResultTable, GivesThePoseItsOwnShareOfTheBelief) {

@@ -133,19 +133,6 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-/// Recognises what is missing of the shard. Returns the counts of this run.
-BatchCounts compute(const BatchRun& run) {
-  run.job.device();  // opens it before the line of progress is there
-  Progress progress("recognising");
-  const auto begin = std::chrono::steady_clock::now();
-  return run_batch(run, [&](const BatchCounts& counts) {
-    const double seconds = seconds_since(begin);
-    progress.show(static_cast<double>(counts.done) / static_cast<double>(run.to_be_done),
-                  fmt::format(", {:.0f} per second{}", static_cast<double>(counts.done) / seconds,
-                              counts.failed > 0 ? fmt::format(", {} failed", counts.failed) : ""));
-  });
-}
-
 std::string batch_summary(const BatchArguments& options, const Shard& shard, const Chunks& chunks,
                           const BatchCounts& now, double seconds) {
   const std::size_t failed = chunks.finished.failed + now.failed;
@@ -187,13 +174,22 @@ void batch(const BatchArguments& options) {
   BatchCounts now;
   if (chunks.to_be_done > 0) {
     folder.make();
-    now = compute({.folder = folder,
-                   .task = task,
-                   .job = job,
-                   .wanted = chunks.wanted,
-                   .to_be_done = chunks.to_be_done,
-                   .threads = threads,
-                   .verbose = options.verbose});
+    job.device();  // opens it before the line of progress is there
+    Progress progress("recognising");
+    const BatchRun run{.folder = folder,
+                       .task = task,
+                       .job = job,
+                       .wanted = chunks.wanted,
+                       .to_be_done = chunks.to_be_done,
+                       .threads = threads,
+                       .verbose = options.verbose};
+    now = run_batch(run, [&](const BatchCounts& counts) {
+      const auto done = static_cast<double>(counts.done);
+      progress.show(
+          done / static_cast<double>(run.to_be_done),
+          fmt::format(", {:.0f} per second{}", done / seconds_since(begin),
+                      counts.failed > 0 ? fmt::format(", {} failed", counts.failed) : ""));
+    });
   }
   fmt::print("{}", batch_summary(options, shard, chunks, now, seconds_since(begin)));
   if (chunks.finished.failed + now.failed > 0) {
