@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <tuple>
+#include <vector>
 
 #include "model/refuse.hpp"
 
@@ -16,6 +17,12 @@ namespace palpate {
 /// Size in bytes of a regular file that may be read.
 /// @throws Error where it is missing, a folder, not a regular file or not readable.
 std::uintmax_t require_readable(const std::filesystem::path& path);
+
+/// The paths in a folder, sorted. @throws Error where it cannot be read
+std::vector<std::filesystem::path> paths_in(const std::filesystem::path& folder);
+
+/// A file's content. @throws Error as require_readable()
+std::string read_bytes(const std::filesystem::path& file);
 
 /// Hash of bytes, in hexadecimal (FNV-1a, 64 bits): tells files apart that nobody has forged.
 std::string hash_of(std::string_view bytes);

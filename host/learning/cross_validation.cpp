@@ -16,7 +16,7 @@
 #include "learning/progress.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
-#include "recognition/object_fit.hpp"
+#include "recognition/label_probability.hpp"
 
 namespace palpate {
 

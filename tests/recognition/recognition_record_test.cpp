@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 
 #include "palpate/error.hpp"
-#include "recognition/object_fit.hpp"
+#include "recognition/label_probability.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/scales.hpp"
 #include "reference/reference.hpp"
