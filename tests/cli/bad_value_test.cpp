@@ -225,7 +225,8 @@ TEST_F(RecognitionFlags, MapsThatCannotStandTogetherAreNamed) {
   OccupancyGrid other = sample_map("I");
   other.prior = 0.3;
   write_map(folder_ / "I.map.h5", other);
-  expect_named(refusal({"--bins=9x9x8"}), {"I.map.h5", "prior", "--prior"});
+  expect_named(refusal({"--bins=9x9x8"}),
+               {"I.map.h5", "prior 0.3 differs", "no touches", "A.map.h5", "--prior"});
   EXPECT_EQ(job({"--bins=9x9x8", "--prior=0.2"}).task().contact().prior, 0.2);
 }
 

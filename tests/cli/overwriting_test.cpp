@@ -174,35 +174,16 @@ TEST_F(Overwriting, AFileCalledDashIsKept) {
 
 // As `cat` refuses to append a file to itself.
 TEST_F(Overwriting, StandardInputAndOutputAreFilesToo) {
-  const Outcome posed = palpate("record --poses - -o poses.jsonl --sensor " + presses,
-                                {.standard_input = folder_ / "poses.jsonl"});
-  EXPECT_EQ(posed.status, 2);
-  expect_named(posed.err, {"-o poses.jsonl: would overwrite -, which --poses reads"});
+  expect_failed(2, "record --poses - -o poses.jsonl --sensor " + presses,
+                {"-o poses.jsonl: would overwrite -, which --poses reads"},
+                {.standard_input = folder_ / "poses.jsonl"});
   put_bytes(folder_ / "out", "");
-  const Outcome printed = palpate("recognize u.h5 --maps maps --json - --posterior out",
-                                  {.standard_output = folder_ / "out"});
-  EXPECT_EQ(printed.status, 2);
-  expect_named(printed.err, {"--json -: would overwrite out, which --posterior writes"});
+  expect_failed(2, "recognize u.h5 --maps maps --json - --posterior out",
+                {"--json -: would overwrite out, which --posterior writes"},
+                {.standard_output = folder_ / "out"});
 }
 
-class FullDisk : public LetterFiles {
- protected:
-  /// Expects status 1 and one line that names this.
-  void expect_failure(const std::string& command, const Surroundings& surroundings,
-                      const char* named) const {
-    SCOPED_TRACE(command);
-    const Outcome outcome = palpate(command, surroundings);
-    EXPECT_EQ(outcome.status, 1) << outcome.err;
-    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
-    expect_named(outcome.err, {named});
-  }
-  /// The same, and the folder as it was before, where files may grow to so many bytes.
-  void expect_untouched(const std::string& command, rlim_t bytes, const char* named) const {
-    const auto before = content_of(folder_.path());
-    expect_failure(command, {.largest_file_bytes = bytes}, named);
-    EXPECT_TRUE(content_of(folder_.path()) == before) << "the folder has changed: " << command;
-  }
-};
+using FullDisk = LetterFiles;
 
 TEST_F(FullDisk, LeavesNoPartOfAnOutputAndAnOlderFileIntact) {
   for (const auto& [command, file] :
@@ -216,7 +197,7 @@ TEST_F(FullDisk, LeavesNoPartOfAnOutputAndAnOlderFileIntact) {
     std::filesystem::create_directories((folder_ / file).parent_path());
     put_bytes(folder_ / file, "an older file");
     // Below the size of every output here, above that of a message.
-    expect_untouched(command, 2048, file);
+    expect_failed(1, command, {file}, {.largest_file_bytes = 2048});
   }
 }
 
@@ -224,8 +205,9 @@ TEST_F(FullDisk, LeavesJsonAndPosteriorBothOrNone) {
   const std::string recognize =
       "recognize A.h5 --maps maps/A.map.h5 --json r.json --posterior p.h5";
   // Below the size of one of them, above that of the other.
-  expect_untouched(recognize + " --bins 5x5x4 --trace", 12000, "r.json");
-  expect_untouched(recognize + " --bins 25x25x16", 12000, "p.h5");
+  const Surroundings small{.largest_file_bytes = 12000};
+  expect_failed(1, recognize + " --bins 5x5x4 --trace", {"r.json"}, small);
+  expect_failed(1, recognize + " --bins 25x25x16", {"p.h5"}, small);
 }
 
 TEST_F(FullDisk, OfStandardOutputIsAFailureThatLeavesFiles) {
@@ -237,9 +219,9 @@ TEST_F(FullDisk, OfStandardOutputIsAFailureThatLeavesFiles) {
         recognize + " --json -", std::string("--help"), std::string("--version"),
         std::string("live --sensor simulate:A,rate=100,touches=2,speed=max --maps maps/A.map.h5"
                     " --bins 5x5x4")}) {
-    expect_failure(command, {.standard_output = "/dev/full"}, "standard output");
+    expect_failed(1, command, {"standard output"}, {.standard_output = "/dev/full"});
   }
-  expect_failure(recognize + " --json r.json", {.standard_output = "/dev/full"}, "standard output");
+  EXPECT_EQ(palpate(recognize + " --json r.json", {.standard_output = "/dev/full"}).status, 1);
   EXPECT_EQ(nlohmann::json::parse(bytes_of(folder_ / "r.json")).size(), 48u);
 }
 
@@ -289,9 +271,9 @@ TEST_F(FullDisk, AndMemoryThatEndsAreOneLine) {
     text += fmt::format("{},0,1\n", i);
   }
   put_bytes(folder_ / "log.csv", text);
-  expect_failure("import log.csv --array 100:100:1 -o o.h5", {.memory_bytes = 512 << 20},
-                 "palpate: out of memory; end other programs, or use smaller files");
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "o.h5"));
+  expect_failed(1, "import log.csv --array 100:100:1 -o o.h5",
+                {"palpate: out of memory; end other programs, or use smaller files"},
+                {.memory_bytes = 512 << 20});
 }
 
 using ImportMemory = ProgramTest;

@@ -130,7 +130,10 @@ const std::vector<Wish>& wishes() {
       {"seed", "7", "", {{"particles", {10000, false, false, 7}}}, "particles"},
       {"sensor-model", "s.yaml", "sensor_model: s.yaml",
        R"({"threshold": 5, "ratio": 0.6, "gamma": 0.3, "touch_sd": [1, 0], "sensor": 4,
-           "evidence_nats": 0.2})"_json}};
+           "evidence_nats": 0.2})"_json},
+      // Particles take touches for exact.
+      {"sensor-model", "s.yaml", "sensor_model: s.yaml",
+       R"({"threshold": 5, "ratio": 0.6, "gamma": 0.3, "sensor": 4})"_json, "particles"}};
   return all;
 }
 
@@ -207,13 +210,6 @@ TEST_F(TaskOfFlags, HasTheDefaultLatticeWhereFlagsSayAutoWhateverTheScene) {
   EXPECT_EQ(task_told({}, "{bins: auto, region: {pivot_mm: auto}}"), automatic);
   EXPECT_EQ(task_told({}, "bins: fine"), task_told({"--bins=fine"}));
   EXPECT_NE(task_told({"--bins=fine"})["x"], automatic["x"]);
-}
-
-TEST_F(TaskOfFlags, TakesTouchesForExactByParticlesWhateverTheSensorModelSays) {
-  const json r = task_told(
-      {"--filter=particles", "--bins=9x9x8", "--sensor-model=" + (folder_ / "s.yaml").string()});
-  EXPECT_EQ(r["touch_sd"], (json{0, 0}));
-  EXPECT_EQ(r["threshold"], 5.0);
 }
 
 TEST_F(TaskOfFlags, HasTheScenesObjectsAndANinthOfTheirWeightsForNone) {

@@ -33,6 +33,7 @@ RecognitionRecord record_of(double dropped_mass, std::vector<ProbabilityInterval
   return {.recording = "/data/mug.h5", .frame = {}, .touches = 2, .trace = {step, step}};
 }
 
+/// The first sentence of findings; "" where there is none.
 std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task) {
   const StepSentences words = sentences_of(step, task);
   return words.findings.empty() ? "" : words.findings.front();
@@ -55,36 +56,36 @@ TEST(DroppedText, RoundsUpToOneDigit) {
 }
 
 TEST(UnprovenSentence, SaysTheBoundsAndWhatEndedTheSearch) {
-  const RecognitionRecord wide = record_of(0.9697, {{0.0313, 0.99997}, {0.00003, 0.9687}});
-  EXPECT_EQ(unproven_sentence(wide.last(), task_with(0.1)),
-            "A 62.0 % (at least 3.1 %, at most 100.0 %): the budget of 100 ms left 97 % of the "
-            "belief unproven");
-  EXPECT_EQ(unproven_sentence(record_of(0.0123, {{0.6, 0.65}, {0.35, 0.4}}).last(), task_with({})),
-            "A 62.0 % (at least 60.0 %, at most 65.0 %): rounding left 1.2 % of the belief "
-            "unproven");
-  EXPECT_EQ(unproven_sentence(record_of(1e-7, {{0.1, 0.99}, {0.0, 0.1}}).last(), task_with(0.1)),
-            "A 62.0 % (at least 10.0 %, at most 99.0 %): the budget of 100 ms left the "
-            "probability of (none) unproven");
-  EXPECT_EQ(unproven_sentence(record_of(0.37, {{1.0, 1.0}, {0.0, 0.0}}).last(), task_with({})),
-            "A 62.0 % (at least 100.0 %, at most 100.0 %): rounding left 37 % of the belief "
-            "unproven");
-  const auto with_poor_fits = [](std::int64_t bins) {
+  const auto poor_fits = [](std::int64_t bins) {
     return RecognitionTask({{sample_map("A")}, {sample_map("I")}},
                            BoundedOptions{.poor_bins = bins});
   };
-  const RecognitionRecord little = record_of(2.3e-6, {{1.0, 1.0}, {0.0, 0.0}});
-  EXPECT_EQ(unproven_sentence(little.last(), with_poor_fits(1234)),
-            "A 62.0 % (at least 100.0 %, at most 100.0 %): the search, which met nothing but poor "
-            "fits, left 0.00023 % of the belief unproven");
-  EXPECT_EQ(unproven_sentence(little.last(), with_poor_fits(1235)),
-            "A 62.0 % (at least 100.0 %, at most 100.0 %): rounding left 0.00023 % of the belief "
-            "unproven");
-  EXPECT_EQ(unproven_sentence(record_of(1e-4, {{0.6, 0.64}, {0.36, 0.4}}).last(), task_with(0.1)),
-            "")
-      << "the tolerance holds";
-  EXPECT_EQ(unproven_sentence(wide.last(), RecognitionTask({{sample_map("A")}, {sample_map("I")}},
-                                                           HistogramOptions{})),
-            "");
+  const RecognitionTask histogram({{sample_map("A")}, {sample_map("I")}}, HistogramOptions{});
+  using Bounds = std::vector<ProbabilityInterval>;
+  const Bounds wide{{0.0313, 0.99997}, {0.00003, 0.9687}};
+  const Bounds sure{{1.0, 1.0}, {0.0, 0.0}};
+  const std::tuple<double, Bounds, RecognitionTask, const char*> cases[] = {
+      {0.9697, wide, task_with(0.1),
+       "(at least 3.1 %, at most 100.0 %): the budget of 100 ms left 97 % of the belief unproven"},
+      {0.0123, Bounds{{0.6, 0.65}, {0.35, 0.4}}, task_with({}),
+       "(at least 60.0 %, at most 65.0 %): rounding left 1.2 % of the belief unproven"},
+      {1e-7, Bounds{{0.1, 0.99}, {0.0, 0.1}}, task_with(0.1),
+       "(at least 10.0 %, at most 99.0 %): the budget of 100 ms left the probability of (none) "
+       "unproven"},
+      {0.37, sure, task_with({}),
+       "(at least 100.0 %, at most 100.0 %): rounding left 37 % of the belief unproven"},
+      {2.3e-6, sure, poor_fits(1234),
+       "(at least 100.0 %, at most 100.0 %): the search, which met nothing but poor fits, left "
+       "0.00023 % of the belief unproven"},
+      {2.3e-6, sure, poor_fits(1235),
+       "(at least 100.0 %, at most 100.0 %): rounding left 0.00023 % of the belief unproven"}};
+  for (const auto& [dropped, bounds, task, words] : cases) {
+    EXPECT_EQ(unproven_sentence(record_of(dropped, bounds).last(), task),
+              std::string("A 62.0 % ") + words);
+  }
+  const RecognitionRecord proven = record_of(1e-4, {{0.6, 0.64}, {0.36, 0.4}});
+  EXPECT_EQ(unproven_sentence(proven.last(), task_with(0.1)), "") << "the tolerance holds";
+  EXPECT_EQ(unproven_sentence(record_of(0.9697, wide).last(), histogram), "");
 }
 
 TEST(Certificate, IsSaidWhereProbabilitiesAre) {

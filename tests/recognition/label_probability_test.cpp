@@ -1,4 +1,5 @@
-// Temperature and press features, with numbers that were worked out by hand.
+// Temperature and press features, with numbers that were worked out by hand, and the bounds of
+// labels from those of their hypotheses' evidence.
 
 #include "recognition/label_probability.hpp"
 
@@ -14,6 +15,10 @@
 #include "recognition/recognition_record.hpp"
 #include "recognition/scales.hpp"
 #include "shapes.hpp"
+#include "support/errors.hpp"
+#include "support/limits.hpp"
+#include "support/synthetic.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::label_probability_test {
 
@@ -131,25 +136,114 @@ TEST(LabelProbability, PassesOverTouchesWithoutContact) {
             std::vector<double>(2));
 }
 
-TEST(LabelBounds, FollowTheTemperatureAndTheFeatures) {
-  RecognitionTask task = two_labels(BoundedOptions{});
-  task.sensor.temperature = 2.0;
-  Estimate estimate = four_to_one();
-  // Evidence of L within 4 to 9, of the disc within 1 to 4.
-  estimate.certificate = Certificate{
-      .log_evidence = {{std::log(3.0), std::log(8.0)}, {0.0, std::log(4.0)}, {0.0, 0.0}}};
-  const RecognitionStep step = judge(estimate, {}, task);
-  ASSERT_EQ(step.identity_bounds.size(), 2u);
-  EXPECT_NEAR(step.identity_bounds[0].low, 2.0 / (2.0 + 2.0), 1e-15);
-  EXPECT_NEAR(step.identity_bounds[0].high, 3.0 / (3.0 + 1.0), 1e-15);
-  EXPECT_NEAR(step.identity_bounds[1].low, 1.0 / (1.0 + 3.0), 1e-15);
-  EXPECT_NEAR(step.identity_bounds[1].high, 2.0 / (2.0 + 2.0), 1e-15);
+constexpr double nothing = -infinity;
 
-  task.sensor.features = features_of_the_letter();
-  const RecognitionStep with = step_after(1, estimate, task);
-  const double times = std::exp(nats_of_one_press());
-  EXPECT_NEAR(with.identity_bounds[0].low, 2.0 * times / (2.0 * times + 2.0), 1e-14);
-  EXPECT_NEAR(with.identity_bounds[1].high, 2.0 / (2.0 + 2.0 * times), 1e-14);
+/// Evidence of three hypotheses and of none, as a filter that evaluated the lows tells it; none's
+/// is at most so many times as large.
+Estimate estimate_of(const std::vector<LogInterval>& evidence, double none,
+                     double none_at_most = 1.0) {
+  Estimate estimate;
+  double total = none;
+  for (const LogInterval& one : evidence) {
+    total += std::exp(one.low);
+  }
+  for (const LogInterval& one : evidence) {
+    estimate.identity.push_back(std::exp(one.low) / total);
+    estimate.log_evidence.push_back(one.low);
+  }
+  estimate.none = none / total;
+  estimate.certificate = Certificate{.log_evidence = evidence};
+  if (none > 0.0) {
+    estimate.none_log_evidence = std::log(none);
+    estimate.certificate->none_log_evidence =
+        LogInterval{std::log(none), std::log(none_at_most * none)};
+  }
+  return estimate;
+}
+
+TEST(LabelBounds, AreTheProbabilitiesOfExactEvidenceHoweverTheseAreRounded) {
+  const RecognitionTask task = two_labels(BoundedOptions{});
+  const Estimate estimate = estimate_of({{-3.0, -3.0}, {-2.0, -2.0}, {-4.0, -4.0}}, 0.0);
+  const Tempering tempering = tempering_of({}, task);
+  std::vector<double> identity = label_probabilities(estimate, tempering, task);
+  for (const double rounding : {1e-14, 1e-12}) {  // the first is of sums of three logs in float64
+    identity[0] *= 1.0 - rounding;
+    identity[1] *= 1.0 + rounding;
+    const auto bounds = label_bounds(estimate, identity, tempering, task);
+    ASSERT_EQ(bounds.size(), 2u);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_LE(bounds[i].low, identity[i]);
+      EXPECT_GE(bounds[i].high, identity[i]);
+      EXPECT_LE(bounds[i].high - bounds[i].low, 2.0 * rounding);
+    }
+  }
+}
+
+TEST(LabelBounds, HoldEveryEvidenceWithinItsBoundsAndAreReached) {
+  Uniform random(3);
+  for (int trial = 0; trial < trials(100); ++trial) {
+    const double none = trial % 2 == 0 ? 0.0 : std::exp(random(-8.0, 2.0));
+    RecognitionTask task =
+        two_labels(BoundedOptions{.none_weight = none > 0.0 ? std::optional(1.0) : std::nullopt});
+    task.sensor.temperature = 1.0 + trial % 3;
+    const std::size_t presses = trial / 2 % 2;
+    task.sensor.features = features_of_the_letter();
+    std::vector<LogInterval> evidence;
+    for (int h = 0; h < 3; ++h) {
+      const double low = random(-6.0, 0.0);
+      evidence.push_back({low, low + random(0.0, 3.0)});
+    }
+    const double none_at_most = random(1.0, 3.0);
+    const RecognitionStep step =
+        step_after(presses, estimate_of(evidence, none, none_at_most), task);
+    std::vector<ProbabilityInterval> seen(task.labels.size(), {1.0, 0.0});
+    for (int corner = 0; corner < 16; ++corner) {
+      std::vector<double> sums(task.labels.size());
+      for (std::size_t h = 0; h < 3; ++h) {
+        const LogInterval& one = evidence[h];
+        sums[task.label_of[h]] += std::exp((corner >> h) % 2 == 0 ? one.low : one.high);
+      }
+      if (none > 0.0) {
+        sums.back() = corner < 8 ? none : none_at_most * none;
+      }
+      for (double& sum : sums) {
+        sum = std::pow(sum, 1.0 / task.sensor.temperature);
+      }
+      sums[0] *= presses > 0 ? std::exp(nats_of_one_press()) : 1.0;
+      const double total = std::accumulate(sums.begin(), sums.end(), 0.0);
+      for (std::size_t i = 0; i < sums.size(); ++i) {
+        seen[i].low = std::min(seen[i].low, sums[i] / total);
+        seen[i].high = std::max(seen[i].high, sums[i] / total);
+      }
+    }
+    ASSERT_EQ(step.identity_bounds.size(), seen.size());
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      // A probability is monotone in each evidence, so that its extremes lie in the corners.
+      EXPECT_NEAR(step.identity_bounds[i].low, seen[i].low, 1e-12);
+      EXPECT_NEAR(step.identity_bounds[i].high, seen[i].high, 1e-12);
+    }
+  }
+}
+
+TEST(LabelBounds, OfEvidenceThatNothingOrAllIsKnownOf) {
+  using Ends = std::vector<std::pair<double, double>>;
+  const auto bounds = [](const Estimate& estimate, const RecognitionTask& task) {
+    Ends ends;
+    for (const auto& [low, high] : judge(estimate, {}, task).identity_bounds) {
+      ends.emplace_back(low, high);
+    }
+    return ends;
+  };
+  const RecognitionTask two_maps({shapes()[0], shapes()[0]}, BoundedOptions{});
+  EXPECT_EQ(bounds(estimate_of({{-9.0, 0.0}, {-8.0, -2.0}}, 0.0), two_maps), (Ends{{1.0, 1.0}}))
+      << "one label, whichever of its maps it is";
+  const Estimate below = estimate_of({{0.0, 0.0}, {nothing, -2000.0}, {nothing, 1.0}}, 0.0);
+  EXPECT_EQ(bounds(below, two_labels(BoundedOptions{})), (Ends{{1.0, 1.0}, {0.0, 0.0}}))
+      << "below every float64";
+  const Estimate unknown{.identity = {1.0},
+                         .certificate = Certificate{.log_evidence = {{nothing, 0.0}}}};
+  EXPECT_EQ(bounds(unknown, {{shapes()[0]}, BoundedOptions{}}), (Ends{{0.0, 1.0}}))
+      << "of a search that evaluated nothing, and no NaN";
 }
 
 TEST(Evidence, IsWhatBoundsFindWhereATemperatureNeedsIt) {
@@ -187,8 +281,14 @@ TEST(WiderBins, AreToldOfWhereTheSensorModelWasLearnedOnNarrowerOnes) {
   EXPECT_EQ(wider_bins(bounds, BinSteps{0.7, 0.7, 0.07}), "") << "by less than a half";
   for (const BinSteps& steps :
        {BinSteps{0.6, 1.0, 0.1}, BinSteps{1.0, 0.6, 0.1}, BinSteps{1.0, 1.0, 0.06}}) {
-    EXPECT_NE(wider_bins(bounds, steps).find("too sure"), std::string::npos);
+    EXPECT_NE(wider_bins(bounds, steps), "");
   }
+  BoundedOptions uncertain = bounds;
+  uncertain.touch_sd = {.mm = 2.0, .rad = 0.2};
+  EXPECT_EQ(wider_bins(uncertain, BinSteps{0.6, 0.6, 0.06}), "") << "the belief is as smooth";
+  expect_named(wider_bins(bounds, BinSteps{0.6, 0.5, 0.0436332}),
+               {"bins are 1 x 1 mm x 5.73 degrees wide, wider than the 0.6 x 0.5 mm x 2.5 degrees",
+                "too sure", "`bins 20x20x20`"});
   EXPECT_NE(wider_bins(bounds, BinSteps{1.0, 1.0, 0.0}), "") << "learned at a fixed angle";
   bounds.lattice.theta_rad = {0.0, 6.0, 1};
   EXPECT_NE(wider_bins(bounds, BinSteps{1.0, 1.0, 0.5}), "") << "one bin is as wide as the region";
@@ -197,38 +297,18 @@ TEST(WiderBins, AreToldOfWhereTheSensorModelWasLearnedOnNarrowerOnes) {
   EXPECT_EQ(wider_bins(ParticleOptions{}, BinSteps{0.6, 0.6, 0.0}), "") << "particles have none";
 }
 
-/// Three presses of a task with "(none)", and how well objects of the sensor model fit.
-class MisfitOfNone : public testing::Test {
- protected:
-  Tempering tempering(const Fit& fit) const { return tempering_of(touches_, task_, fit); }
-
-  RecognitionTask task_ = two_labels(HistogramOptions{.none_weight = 0.2});
-  std::vector<TouchEvidence> touches_ = evidence_of(presses(3), task_.contact());
-  FitScale scale_{.mean = 0.1, .sd = 0.9, .shared_sd = 0.1};
-};
-
-TEST_F(MisfitOfNone, CountsForNoneAloneWhereTheScaleWasLearned) {
+TEST(Misfit, CountsForNoneAloneWhereTheScaleWasLearned) {
+  RecognitionTask task = two_labels(HistogramOptions{.none_weight = 0.2});
   const Fit fit{.z = -8.0};
-  EXPECT_EQ(tempering(fit).features.back(), 0.0);
-  task_.sensor.fit_scale = scale_;
-  EXPECT_EQ(tempering(fit).features.back(),
-            misfit_nats(fit, 3, {.stranger_sd = usual_stranger_sd}));
-  EXPECT_EQ(tempering(fit).features.front(), 0.0);
-}
-
-TEST_F(MisfitOfNone, IsByHowBadlyStrangersFitTheObjectsOfTheSensorModel) {
-  Estimate estimate = four_to_one();
-  estimate.none_log_evidence = 0.0;
-  const auto none = [&](const Fit& fit, std::optional<double> stranger_sd) {
-    task_.sensor.fit_scale = scale_;
-    task_.sensor.fit_scale->stranger_sd = stranger_sd;
-    return label_probabilities(estimate, tempering(fit), task_).back();
+  const auto features = [&] {
+    return tempering_of(evidence_of(presses(3), task.contact()), task, fit).features;
   };
-  // Where strangers fit hardly worse than learned objects, a fair fit may be one's, and a bad one
-  // is neither's.
-  EXPECT_GT(none({.z = -2.0}, 1.0), none({.z = -2.0}, {}));
-  EXPECT_LT(none({.z = -16.0}, 1.0), none({.z = -16.0}, {}));
-  EXPECT_EQ(none({.z = -2.0}, usual_stranger_sd), none({.z = -2.0}, {}));
+  EXPECT_EQ(features().back(), 0.0);
+  task.sensor.fit_scale = FitScale{.mean = 0.1, .sd = 0.9, .shared_sd = 0.1};
+  EXPECT_EQ(features().back(), misfit_nats(fit, 3, {.stranger_sd = usual_stranger_sd}));
+  EXPECT_EQ(features().front(), 0.0);
+  task.sensor.fit_scale->stranger_sd = 1.0;
+  EXPECT_EQ(features().back(), misfit_nats(fit, 3, {.stranger_sd = 1.0}));
 }
 
 double nats(double z, std::size_t touches) { return misfit_nats({.z = z}, touches, {}); }
@@ -275,6 +355,21 @@ TEST(Misfit, OfOneTouchIsByWhatStrangersAreLike) {
       0.9 * std::exp(-2.0) / 3.0 + 0.1 * std::exp(-18.0 / (25.0 + 8.0)) / std::sqrt(25.0 + 8.0);
   const double stranger = 0.9 / 2.0 + 0.1 / std::sqrt(25.0 + 3.0);
   EXPECT_NEAR(misfit_nats(bad, 1, scale), std::log(stranger / learned), 1e-12);
+}
+
+TEST(NearbyFit, IsAsGoodAsThatOfTheTruePoseHalfAStepAway) {
+  const OccupancyGrid map = map_of(on_letter_l, "L");
+  const ContactModel contact{.prior = 0.2};
+  const Pose truth{{1.3, -0.8}, 0.7};
+  const Recording recording = touches_of(on_letter_l, truth, 20, 856);
+  const std::vector<Touch> touches = all_touches(recording);
+  const double at_truth = fit_of(touches, truth, map, contact, 0)->z;
+  for (const glm::dvec2& off_mm : {glm::dvec2(0.375, 0.0), {-0.4375, 0.25}, {0.4, 0.4}}) {
+    const Pose start{truth.translation_mm + off_mm, truth.theta_rad + 0.05};
+    EXPECT_LT(fit_of(touches, start, map, contact, 0)->z, at_truth - 1.0);
+    // The best pose of these touches fits a little better than the true one.
+    EXPECT_GT(best_fit_near(evidence_of(touches, contact), start, map, contact, 0)->z, at_truth);
+  }
 }
 
 }  // namespace palpate::label_probability_test

@@ -6,8 +6,11 @@
 #include <stdexcept>
 
 #include <gmock/gmock.h>
+#include <glm/geometric.hpp>
 
 #include "palpate/error.hpp"
+#include "palpate/learned_sensor.hpp"
+#include "recognition/filter_choice.hpp"
 #include "recognition/label_probability.hpp"
 #include "recognition/record_json.hpp"
 #include "recognition/scales.hpp"
@@ -59,7 +62,16 @@ TEST_P(Recognise, MakesABrokenUnknownARecordAndTheOthersAreRight) {
     }
     for (const auto& [good, recording] : {std::pair(0U, &letter), {4U, &disc}}) {
       expect_same(records[good], recognised(task_, *recording, trace));
-      EXPECT_EQ(records[good].last().right, true);
+      const RecognitionStep& step = records[good].last();
+      EXPECT_EQ(step.right, true);
+      EXPECT_EQ(step.certificate.has_value(), bounded());
+      ASSERT_EQ(step.identity_bounds.size(), bounded() ? 2U : 0U);
+      for (std::size_t i = 0; i < step.identity_bounds.size(); ++i) {
+        const auto [low, high] = step.identity_bounds[i];
+        EXPECT_TRUE(low <= step.identity[i] && step.identity[i] <= high);
+        // All of the mass that is dropped may be of one label.
+        EXPECT_LE(high - low, 2.1e-6) << "twice the tolerance";
+      }
       EXPECT_EQ(records[good].trace.size(), trace ? 6U : 1U);
       EXPECT_NO_THROW(records[good].require_steps());
     }
@@ -126,32 +138,23 @@ TEST(PoseOfAStep, IsScaledByThatOfReadingsAlone) {
 }
 
 TEST(Progress, SaysHowFarRecognitionIsAndCanEndIt) {
-  const RecognitionTask task(shapes(), every_filter()[1]);
-  Recogniser recogniser(shared_device(), task);
   const Recording recording = touched_letter(8);
-  for (const bool trace : {false, true}) {
-    std::vector<double> fractions;
-    const RecognitionRecord before =
-        recognise(recogniser, task, unknown_of(recording), trace,
-                  [&](double fraction) { fractions.push_back(fraction); });
-    EXPECT_EQ(fractions.size(), 6U);
-    EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
-    EXPECT_EQ(fractions.back(), 1.0);
-    EXPECT_THROW(recognise(recogniser, task, unknown_of(recording), trace,
-                           [](double) { throw std::runtime_error("Ctrl-C"); }),
-                 std::runtime_error);
-    expect_same(recognise(recogniser, task, unknown_of(recording), trace), before);
-  }
-}
-
-TEST(Progress, CountsTouchesOnceBoundsHaveSearched) {
-  const RecognitionTask task(shapes(), every_filter()[2]);
-  Recogniser recogniser(shared_device(), task);
-  for (const bool trace : {false, true}) {
-    std::vector<double> touches;
-    recognise(recogniser, task, unknown_of(touched_letter(8)), trace,
-              [&](double fraction) { touches.push_back(std::round(6.0 * fraction)); });
-    EXPECT_EQ(touches, trace ? std::vector<double>({1, 2, 3, 4, 5, 6}) : std::vector<double>({6}));
+  for (const std::size_t filter : {1U, 2U}) {
+    const RecognitionTask task(shapes(), every_filter()[filter]);
+    Recogniser recogniser(shared_device(), task);
+    for (const bool trace : {false, true}) {
+      std::vector<double> touches;
+      const RecognitionRecord before =
+          recognise(recogniser, task, unknown_of(recording), trace,
+                    [&](double fraction) { touches.push_back(std::round(6.0 * fraction)); });
+      // Bounds search once for all touches.
+      EXPECT_EQ(touches, trace || filter == 1 ? std::vector<double>({1, 2, 3, 4, 5, 6})
+                                              : std::vector<double>({6}));
+      EXPECT_THROW(recognise(recogniser, task, unknown_of(recording), trace,
+                             [](double) { throw std::runtime_error("Ctrl-C"); }),
+                   std::runtime_error);
+      expect_same(recognise(recogniser, task, unknown_of(recording), trace), before);
+    }
   }
 }
 
@@ -180,45 +183,25 @@ TEST_P(Recognise, SaysWhatFitsAndWhatDoesNot) {
 
 INSTANTIATE_TEST_SUITE_P(By, Recognise, each_filter, filter_name);
 
-TEST(FitOfAStep, IsOfTheAveragedLikelihoodWhereTouchesMayBeDisplaced) {
-  const Recording recording = touched_letter(26);
-  HistogramOptions filter = std::get<HistogramOptions>(every_filter()[0]);
-  filter.touch_sd = {.mm = 1.0, .rad = 0.05};
-  const RecognitionTask task(shapes(), filter);
-  const RecognitionStep step = last_step(task, recording);
-  const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
-  EXPECT_EQ(step.fit.value().z,
-            fit_of(all_touches(recording), step.pose(), map, filter.contact, filter.touch_sd)->z);
-  EXPECT_NE(step.fit->z, fit_of(all_touches(recording), step.pose(), map, filter.contact)->z);
-}
-
-TEST(FitOfAStep, IsOfTheBestLearnedObjectAtThePoseThatIsReported) {
+TEST(FitOfAStep, IsOfTheBestLearnedObjectAtThePoseThatIsReportedByTheAveragedLikelihood) {
   const Recording recording = touched_letter(24);
   HistogramOptions filter = std::get<HistogramOptions>(every_filter()[0]);
   filter.none_weight = 1e300;
   filter.contact.gamma = 0.2;
-  const RecognitionTask task(shapes(), filter);
-  const RecognitionRecord record = recognised(task, recording, true);
-  ASSERT_EQ(record.trace.size(), 6U);
-  for (std::size_t i = 0; i < 6; ++i) {
-    const RecognitionStep& step = record.trace[i];
-    EXPECT_EQ(task.labels[step.best], none_label);
-    EXPECT_EQ(step.fit.value().z,
-              fit_of(recording.touches(0, i + 1), step.refined.value().T_object_robot,
-                     task.hypotheses[step.mode.object].map, filter.contact)
-                  ->z);
+  for (const DisplacementSd& sd : {DisplacementSd{}, {.mm = 1.0, .rad = 0.05}}) {
+    filter.touch_sd = sd;
+    const RecognitionTask task(shapes(), filter);
+    const RecognitionRecord record = recognised(task, recording, true);
+    ASSERT_EQ(record.trace.size(), 6U);
+    for (std::size_t i = 0; i < 6; ++i) {
+      const RecognitionStep& step = record.trace[i];
+      EXPECT_EQ(task.labels[step.best], none_label);
+      EXPECT_EQ(step.fit.value().z,
+                fit_of(recording.touches(0, i + 1), step.refined.value().T_object_robot,
+                       task.hypotheses[step.mode.object].map, filter.contact, sd)
+                    ->z);
+    }
   }
-}
-
-TEST(Judge, AddsUpTheMapsOfALabel) {
-  const RecognitionTask task(three_maps(), HistogramOptions{});
-  const RecognitionStep step =
-      judge(estimate_of({0.3, 0.4, 0.3}, 1, {}), {.label = "L", .T_object_robot = Pose{}}, task);
-  EXPECT_EQ(step.identity, (std::vector<double>{0.3 + 0.3, 0.4}));
-  EXPECT_EQ(task.labels[step.best], "L") << "although the mode's map is the disc's";
-  EXPECT_EQ(step.confidence(), 0.3 + 0.3);
-  EXPECT_EQ(step.right, true);
-  EXPECT_FALSE(step.error_mm) << "the mode has another object";
 }
 
 TEST(Judge, HoldsNoneForRightWhereNoMapHasTheLabel) {
@@ -231,26 +214,22 @@ TEST(Judge, HoldsNoneForRightWhereNoMapHasTheLabel) {
   EXPECT_EQ(judge(estimate_of({0.1, 0.2}, 1, {}, 0.0), {.label = "ring"}, task).right, false);
 }
 
-TEST(Judge, ErrsAsTheReferenceSays) {
-  std::vector<Hypothesis> two = shapes();
+TEST(Judge, ErrsAsTheReferenceSaysWhereTheTruthIsOfTheModesObject) {
   const Pose found{{2.5, -1.0}, 1.9};
   const Pose truth{{-1.0, 3.0}, 5.2};
-  for (const int symmetry : {0, 1, 2}) {
-    for (Hypothesis& hypothesis : two) {
-      hypothesis.map.symmetry = symmetry;
-    }
-    const RecognitionTask task(two, HistogramOptions{});
-    for (const int object : {0, 1}) {
-      const OccupancyGrid& map = two[object].map;
-      const Estimate estimate = estimate_of({0.5, 0.5}, object, found);
-      const RecognitionStep step =
-          judge(estimate, {.label = map.label, .T_object_robot = truth}, task);
-      ASSERT_TRUE(step.error_mm);
-      // Sums over 2,000 cells of some 100 mm^2 each, in another order.
-      EXPECT_NEAR(*step.error_mm, reference::pose_error_mm(map, found, truth), 1e-9);
-      EXPECT_FALSE(judge(estimate, {.label = map.label}, task).error_mm);
-      EXPECT_FALSE(judge(estimate, {.label = "ring", .T_object_robot = truth}, task).error_mm);
-    }
+  std::vector<Hypothesis> two = shapes();
+  two[0].map.symmetry = 2;
+  const RecognitionTask task(two, HistogramOptions{});
+  for (const int object : {0, 1}) {
+    const OccupancyGrid& map = two[object].map;
+    const auto error_mm = [&](const PartialTruth& of) {
+      return judge(estimate_of({0.5, 0.5}, object, found), of, task).error_mm;
+    };
+    // Sums over 2,000 cells of some 100 mm^2 each, in another order.
+    EXPECT_NEAR(error_mm({.label = map.label, .T_object_robot = truth}).value(),
+                reference::pose_error_mm(map, found, truth), 1e-9);
+    EXPECT_FALSE(error_mm({.label = map.label}));
+    EXPECT_FALSE(error_mm({.label = two[1 - object].map.label, .T_object_robot = truth}));
   }
 }
 
@@ -325,18 +304,84 @@ TEST(ScaledPose, ScalesWhatReadingsTellAndLeavesWhatDisplacementAdds) {
   EXPECT_NEAR(belief_factor(0.25, 1e-2, {.slip_mm2 = 1e-4, .touches = 10'000}), 0.5, 0.01);
 }
 
-TEST(NearbyFit, IsAsGoodAsThatOfTheTruePoseHalfAStepAway) {
-  const OccupancyGrid map = map_of(on_letter_l, "L");
-  const ContactModel contact{.prior = 0.2};
-  const Pose truth{{1.3, -0.8}, 0.7};
-  const Recording recording = touches_of(on_letter_l, truth, 20, 856);
-  const std::vector<Touch> touches = all_touches(recording);
-  const double at_truth = fit_of(touches, truth, map, contact, 0)->z;
-  for (const glm::dvec2& off_mm : {glm::dvec2(0.375, 0.0), {-0.4375, 0.25}, {0.4, 0.4}}) {
-    const Pose start{truth.translation_mm + off_mm, truth.theta_rad + 0.05};
-    EXPECT_LT(fit_of(touches, start, map, contact, 0)->z, at_truth - 1.0);
-    // The best pose of these touches fits a little better than the true one.
-    EXPECT_GT(best_fit_near(evidence_of(touches, contact), start, map, contact, 0)->z, at_truth);
+/// The shapes, of which the letter may lie on its other side.
+std::vector<Hypothesis> mirrored_shapes() {
+  std::vector<Hypothesis> maps = shapes();
+  maps[0].map.mirror = true;
+  add_mirror_images(maps);
+  return maps;
+}
+
+bool on_mirrored_l(const glm::dvec2& p_mm) { return on_letter_l({-p_mm.x, p_mm.y}); }
+
+TEST(Mirror, FindsTheObjectOnItsOtherSide) {
+  const Pose T_object_robot{{1.0, -2.0}, 0.7};
+  for (const bool mirrored : {false, true}) {
+    Recording recording =
+        touches_of(mirrored ? on_mirrored_l : on_letter_l, T_object_robot, 12, 31);
+    recording.truth = {.object = "L", .T_object_robot = T_object_robot};
+    for (const std::size_t filter : {0U, 2U}) {
+      const RecognitionTask task(mirrored_shapes(), every_filter()[filter]);
+      EXPECT_EQ(task.labels, (std::vector<std::string>{"L", "disc"}));
+      const RecognitionStep step = last_step(task, recording);
+      EXPECT_EQ(step.right, true);
+      EXPECT_EQ(task.hypotheses[step.mode.object].mirrored, mirrored);
+      EXPECT_EQ(step.error_mm.has_value(), !mirrored) << "the truth is of the object as learned";
+      EXPECT_EQ(step.refined_error_mm.has_value(), !mirrored);
+      EXPECT_EQ(step.true_T_robot_object().has_value(), !mirrored);
+      EXPECT_EQ(step.fit.value().verdict, Verdict::fits);
+      // Bins of 0.5 mm and 22.5 degrees; the image's frame is where the mirrored letter's was.
+      EXPECT_LT(glm::distance(step.pose().translation_mm, T_object_robot.translation_mm), 1.0);
+      EXPECT_NEAR(step.pose().theta_rad, T_object_robot.theta_rad, 0.2);
+    }
+  }
+}
+
+/// A table of Eq. 7 over a layer, but for the disc's own numbers, which leave more to chance, with
+/// features of the disc and a temperature.
+LearnedSensor learned_sensor() {
+  const ContactModel equation_7{.gamma = 0.1, .prior = 0.2};
+  LearnedSensor sensor{.table = LearnedTable{.layer = {.near_mm = 1.0, .far_mm = 3.0}},
+                       .temperature = 4.0};
+  for (const Reading reading : {Reading::no_contact, Reading::in_contact}) {
+    for (int i = 0; i < ReadingLayer::nodes; ++i) {
+      const double nats = equation_7.log_likelihood(reading, {ReadingLayer::first_node + 0.5 * i});
+      sensor.table->shared.push_back(nats);
+      sensor.table->objects["disc"].push_back(0.8 * nats);
+    }
+  }
+  sensor.features = {.weight = 0.3,
+                     .any = {.mean = {2.0, 4.0, 1.5}, .sd = {1.0, 1.0, 1.0}},
+                     .objects = {{"disc", {.mean = {3.0, 5.0, 2.0}, .sd = {0.5, 0.5, 0.5}}}}};
+  return sensor;
+}
+
+TEST(LearnedSensor, TellsTheSameByBoundsAsByTheHistogram) {
+  const LearnedSensor sensor = learned_sensor();
+  for (const Recording& recording : {touched_letter(5), touched_disc(6), touched_letter(7)}) {
+    std::vector<RecognitionRecord> records;
+    for (const std::size_t filter : {0U, 2U}) {
+      FilterOptions options = every_filter()[filter];
+      std::vector<Hypothesis> maps = mirrored_shapes();
+      std::visit([&](auto& of) { apply(sensor, maps, of.contact); }, options);
+      RecognitionTask task(maps, with_evidence(options, sensor));
+      task.sensor.temperature = sensor.temperature;
+      task.sensor.features = sensor.features;
+      records.push_back(recognised(task, recording, true));
+    }
+    for (std::size_t k = 0; k < recording.size(); ++k) {
+      const RecognitionStep& bounded = records[1].trace[k];
+      ASSERT_EQ(bounded.identity_bounds.size(), 2u);
+      for (std::size_t i = 0; i < 2; ++i) {
+        const auto [low, high] = bounded.identity_bounds[i];
+        // Two log evidences of the histogram, each within 1e-4 nats per touch, over 4.
+        const double rounding = 2e-4 * static_cast<double>(k + 1) / 4.0;
+        EXPECT_GE(records[0].trace[k].identity[i], low - rounding) << "touch " << k;
+        EXPECT_LE(records[0].trace[k].identity[i], high + rounding) << "touch " << k;
+        // Each of two log evidences is known within a 20th of the temperature.
+        EXPECT_LT(high - low, 0.05);
+      }
+    }
   }
 }
 

@@ -148,12 +148,13 @@ nlohmann::json ProgramTest::record(const CommandLine& flags) const {
   return all.at(0);
 }
 
-void ProgramTest::expect_refused(const CommandLine& command,
-                                 const std::vector<std::string>& named) const {
+void ProgramTest::expect_failed(int status, const CommandLine& command,
+                                const std::vector<std::string>& named,
+                                const Surroundings& surroundings) const {
   const auto before = content_of(folder_.path());
-  const Outcome outcome = palpate(command);
+  const Outcome outcome = palpate(command, surroundings);
   SCOPED_TRACE("palpate " + command.text());
-  EXPECT_EQ(outcome.status, 2) << outcome.err;
+  EXPECT_EQ(outcome.status, status) << outcome.err;
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   EXPECT_TRUE(outcome.err.ends_with('\n'));
   for (const std::string& part : named) {

@@ -75,9 +75,14 @@ class ProgramTest : public testing::Test {
   nlohmann::json records(const CommandLine& flags) const;
   /// The one record of `recognize` with these arguments.
   nlohmann::json record(const CommandLine& flags) const;
-  /// Expects status 2, one line on standard error that holds every one of `named`, nothing on
+  /// Expects this status, one line on standard error that holds every one of `named`, nothing on
   /// standard output, and the folder as it was before.
-  void expect_refused(const CommandLine& command, const std::vector<std::string>& named) const;
+  void expect_failed(int status, const CommandLine& command, const std::vector<std::string>& named,
+                     const Surroundings& surroundings = {}) const;
+  /// The same of status 2.
+  void expect_refused(const CommandLine& command, const std::vector<std::string>& named) const {
+    expect_failed(2, command, named);
+  }
   /// The same of each of these commands.
   void expect_each_refused(
       const std::vector<std::pair<std::string, std::vector<std::string>>>& commands) const {
