@@ -15,40 +15,57 @@ namespace palpate::cli::bad_value_test {
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(BadValue, OptionsOfARecognitionRefuseTextsThatCannotBeMeant) {
-  const std::pair<const char*, std::vector<const char*>> cases[] = {
-      {"bins", {"x", "5", "5x5", "5x5x5x5", "0x5x5", "5x-5x5", "5x5x5.5", "autox5x5"}},
-      {"x-mm", {"x", "1", "1:2:3", "10:-10", "nan:1", "0:inf", "0:1e999", "0:2e9"}},
-      {"y-mm", {"x", "1", "1:2:3", "10:-10", "nan:1", "0:inf", "0:1e999", "-2e9:0"}},
-      {"theta-deg", {"x", "1", "1:2:3", "360:0", "nan:1", "0:inf", "0:1e11"}},
-      {"pivot-mm", {"x", "1", "1,2,3", "nan,1", "1:2", "2e9,0"}},
-      {"prior", {"x", "0.2x", "nan", "0", "-1", "1", "1.5"}},
-      {"gamma", {"x", "nan", "-0.1", "1", "1.5"}},
-      {"none", {"x", "1x", "nan", "inf", "-1"}},
-      {"threshold", {"x", "1x", "nan", "inf", "-1"}},
-      {"ratio", {"x", "nan", "-1", "1", "2"}},
-      {"touch-sd-mm", {"x", "nan", "inf", "-1"}},
-      {"touch-sd-deg", {"x", "nan", "inf", "-1"}},
-      {"slip-sd-mm", {"x", "nan", "inf", "-1"}},
-      {"slip-sd-deg", {"x", "nan", "inf", "-1"}},
-      {"act-below-mm", {"x", "nan", "inf", "0", "-1"}},
-      {"act-above", {"x", "nan", "-0.1", "1.1"}},
-      {"filter", {"kalman", "Histogram"}},
-      {"tolerance", {"x", "nan", "0", "1"}},
-      {"budget-ms", {"x", "nan", "inf", "0"}},
-      {"evidence-nats", {"x", "nan", "inf", "0"}},
-      {"particles", {"0", "-1", "1000001", "ten", "1.5"}},
-      {"resampling", {"best"}},
-      {"seed", {"x", "-1", "1.5", "99999999999999999999"}},
-      {"frames", {"x", "1", "1:2:3", "3:3", "4:3", "-1:3", "1.5:3"}},
-      {"touches", {"x", "0", "-1", "1.5"}}};
-  for (const auto& [name, wrong] : cases) {
+TEST(OptionsOfARecognition, ReadWhatTheyWriteAndRefuseTextsThatCannotBeMeant) {
+  const std::tuple<std::string, std::string, std::vector<const char*>> cases[] = {
+      {"bins", "6x5x4", {"x", "5", "5x5", "5x5x5x5", "0x5x5", "5x-5x5", "5x5x5.5", "autox5x5"}},
+      {"x-mm", "-10:0.1", {"x", "1", "1:2:3", "10:-10", "nan:1", "0:inf", "0:1e999", "0:2e9"}},
+      {"y-mm", "1e-07:2", {"x", "1", "1:2:3", "10:-10", "nan:1", "0:inf", "0:1e999", "-2e9:0"}},
+      {"theta-deg", "0:360", {"x", "1", "1:2:3", "360:0", "nan:1", "0:inf", "0:1e11"}},
+      {"pivot-mm", "1.5,-2", {"x", "1", "1,2,3", "nan,1", "1:2", "2e9,0"}},
+      {"prior", "0.25", {"x", "0.2x", "nan", "0", "-1", "1", "1.5"}},
+      {"gamma", "0.1", {"x", "nan", "-0.1", "1", "1.5"}},
+      {"none", "0.5", {"x", "1x", "nan", "inf", "-1"}},
+      {"threshold", "2", {"x", "1x", "nan", "inf", "-1"}},
+      {"ratio", "0.3", {"x", "nan", "-1", "1", "2"}},
+      {"touch-sd-mm", "1", {"x", "nan", "inf", "-1"}},
+      {"touch-sd-deg", "2", {"x", "nan", "inf", "-1"}},
+      {"slip-sd-mm", "3", {"x", "nan", "inf", "-1"}},
+      {"slip-sd-deg", "4", {"x", "nan", "inf", "-1"}},
+      {"act-below-mm", "0.3", {"x", "nan", "inf", "0", "-1"}},
+      {"act-above", "0.9", {"x", "nan", "-0.1", "1.1"}},
+      {"filter", "particles", {"kalman", "Histogram"}},
+      {"tolerance", "1e-06", {"x", "nan", "0", "1"}},
+      {"budget-ms", "5", {"x", "nan", "inf", "0"}},
+      {"evidence-nats", "0.01", {"x", "nan", "inf", "0"}},
+      {"particles", "100", {"0", "-1", "1000001", "ten", "1.5"}},
+      {"resampling", "systematic", {"best"}},
+      {"seed", "18446744073709551615", {"x", "-1", "1.5", "99999999999999999999"}},
+      {"frames", "2:7", {"x", "1", "1:2:3", "3:3", "4:3", "-1:3", "1.5:3"}},
+      {"touches", "3", {"x", "0", "-1", "1.5"}},
+      {"augmented", "true", {"yes"}},
+      {"each-frame", "true", {"yes"}},
+      {"trace", "true", {"yes"}},
+      {"scene", "a b.yaml", {}},
+      {"sensor-model", "s.yaml", {}}};
+  std::map<std::string, std::string> texts;
+  for (const auto& [name, right, wrong] : cases) {
+    texts[name] = right;
     for (const char* text : wrong) {
       Request request;
       EXPECT_TRUE(set_option(request, option_named(name), text).starts_with("give ")) << text;
       EXPECT_EQ(option_text(request, option_named(name)), "") << name << " " << text;
+      EXPECT_THROW(request_with({{name, text}}), Error);
     }
   }
+  for (const Option& option : options()) {
+    EXPECT_TRUE(texts.contains(option.name) || option.name == std::string("device")) << option.name;
+  }
+  EXPECT_EQ(option_texts(request_with(texts)), texts);
+  const std::map<std::string, std::string> words{
+      {"bins", "fine"}, {"pivot-mm", "auto"}, {"none", "auto"}, {"filter", "auto"}};
+  EXPECT_EQ(option_texts(request_with(words)), words);
+  EXPECT_TRUE(option_texts({}).empty());
+  EXPECT_THROW(request_with({{"speed", "1"}}), Error);
 }
 
 TEST(BadValue, OptionsOfAMapRefuseNumbersThatCannotBeMeant) {

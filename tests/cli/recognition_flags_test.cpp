@@ -118,6 +118,7 @@ const std::vector<Wish>& wishes() {
       {"none", "0.5", "none: 0.5", {{"none", 0.5}}},
       {"none", "auto", "none: auto", json::object()},
       {"none", "0", "none: 0", {{"none", nullptr}, {"labels", {"A", "I"}}, {"by_place", false}}},
+      {"none", "0", "none: 0", {{"by_place", false}}, "particles"},
       {"act-below-mm", "0.3", "act_below_mm: 0.3", {{"act", {0.3, 0.99}}}},
       {"act-above", "0.9", "act_above: 0.9", {{"act", {0.5, 0.9}}}},
       {"tolerance", "1e-3", "",
