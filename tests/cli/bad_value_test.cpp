@@ -143,9 +143,6 @@ TEST_F(BadValueOnTheCommandLine, IsNamedWithItsFlag) {
 TEST_F(BadValueOnTheCommandLine, IsNamedWithItsScene) {
   const std::pair<const char*, std::vector<std::string>> cases[] = {
       {"gamma: 0.1\n", {"objects: missing", "--maps"}},
-      {"objects: [{map: maps/A.map.h5}]\nnone: -1\n", {"'none' = '-1'", "from 0"}},
-      {"objects: [{map: maps/A.map.h5}]\nregion: {theta_deg: [-10, 351]}\n",
-       {"theta_deg", "wider than the full circle", "at most 360 degrees"}},
       {"objects: [{map: maps/A.map.h5}]\narray: [[0, 0], [1, 0]]\n",
        {"u.h5", "36 elements", "array", "has 2", "leaving the key out"}}};
   for (const auto& [yaml, named] : cases) {
@@ -180,6 +177,8 @@ TEST_F(RecognitionFlags, AreRefusedByNameAndValueWhereTheyCannotBeMeant) {
       {{}, "bins: [5, 5, 5]\nslip_sd: {mm: 25}", {"scene.yaml: slip_sd.mm = 25: wider", "20 mm"}},
       {{}, "touch_sd: {mm: -1}", {"scene.yaml", "line 1", "'mm'", "from 0"}},
       {{}, "slip_sd: {deg: .nan}", {"'deg'", "from 0"}},
+      {{}, "none: -1", {"'none' = '-1'", "from 0"}},
+      {{}, "region: {theta_deg: [-10, 351]}", {"theta_deg", "wider than the full circle"}},
       {{}, "touch_sd: {rad: 0.1}", {"'rad'", "unknown key", "deg"}},
       {{}, "touch_sd: 1", {"touch_sd"}},
       {{}, "region: {x_mm: [0, 1e200]}", {"x_mm", "0:1e200"}},
