@@ -112,6 +112,7 @@ TEST_F(TransferFault, CostsAFrameATransferAndAsManyInARowAsTransfersOpenTheBoard
     SCOPED_TRACE(row.name);
     sensor_->start();  // anew: what was lost before is not told
     EXPECT_EQ(frame_after(100).lost_before, 0U);
+    EXPECT_EQ(board_.usb().seen().urbs_under_way, TransferRing::transfers);
     const FakeUsbDevice::Seen before = board_.usb().seen();
     board_.usb().send_fault(row.fault, row.times);
     ASSERT_TRUE(becomes_true([&] { return sensor_->counters().reconnects == row.reconnects; }));
@@ -130,8 +131,9 @@ TEST_F(TransferFault, CostsAFrameATransferAndAsManyInARowAsTransfersOpenTheBoard
     EXPECT_EQ(after.requests.size() > before.requests.size() + 10, row.reconnects > 0)
         << "the calibration is read again";
   }
-  // Nor is it told where the loss was the last that came.
+  // Nor is it told where the loss was the last that came, nor does a frame come that was not taken.
   sensor_->start();
+  board_.send_frame(1);
   board_.usb().send_fault(Fault::overflow);
   ASSERT_TRUE(becomes_true([&] { return sensor_->counters().lost == 1; }));
   sensor_->start();

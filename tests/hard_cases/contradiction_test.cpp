@@ -67,7 +67,7 @@ TEST(Contradiction, OfEveryHypothesisByPiecesOfThem) {
   const std::vector<Hypothesis> objects{{filled_map(-1000.0F), 1.0}, {filled_map(1000.0F), 1.0}};
   HistogramOptions options = with_gamma(0.0);
   options.none_weight = 1e-30;
-  PoseHistogram histogram(hard.device(), objects, options);
+  PoseHistogram histogram(shared_device(), objects, options);
   // One object explains the first touch, and the other one the second.
   histogram.update(all_touches(press(10.0)));
   EXPECT_LT(histogram.estimate().none, 1e-29);

@@ -71,7 +71,7 @@ TEST(Tie, FullSymmetryTouchedAtTheMiddle) {
   options.lattice.pivot_mm = {12.0, -7.0};
   const Estimate estimate = hard.expect_posterior(objects, options, all_touches(recording));
   EXPECT_LT(estimate.mode.bin, options.lattice.plane()) << "not of the first theta";
-  PoseHistogram histogram(hard.device(), objects, options);
+  PoseHistogram histogram(shared_device(), objects, options);
   histogram.update(all_touches(recording));
   const std::vector<double> bins = histogram.log_likelihood(0);
   for (std::size_t bin = 0; bin < bins.size(); ++bin) {
@@ -113,7 +113,9 @@ TEST(Weight, ExtremelyUnequalOfParticles) {
     const std::vector<Hypothesis> objects{{random_map(61, 61, 0.5, 4.0, 502), first},
                                           {random_map(31, 31, 1.0, 4.0, 503), second}};
     hard.expect_particles(objects, two_thousand_particles(), random_recording(2, 36, 510));
-    return ParticleFilter(hard.device(), objects, two_thousand_particles()).estimate().identity[0];
+    return ParticleFilter(shared_device(), objects, two_thousand_particles())
+        .estimate()
+        .identity[0];
   };
   EXPECT_EQ(first_identity(1e-30, 1.0), 0.0) << "too light for one of 2,000 particles";
   EXPECT_NEAR(first_identity(1e308, 1e308), 0.5, 1e-12);
@@ -133,7 +135,7 @@ TEST(Weight, AtTheEndsOfFloat64) {
   for (const Row& row :
        {Row{1e308, 1.5e308, 0.6, 1}, Row{5e-324, 5e-324, 0.5, 0}, Row{5e-324, 1e308, 1.0, 1}}) {
     SCOPED_TRACE(::testing::Message() << row.first << " and " << row.second);
-    PoseHistogram histogram(hard.device(),
+    PoseHistogram histogram(shared_device(),
                             std::vector<Hypothesis>{{map, row.first}, {map, row.second}},
                             small_options());
     histogram.update(all_touches(recording));
