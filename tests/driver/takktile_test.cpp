@@ -1,4 +1,3 @@
-#include "driver/takktile_protocol.hpp"
 #include "driver/usb_device.hpp"
 #include "fake_takktile.hpp"
 #include "palpate/driver.hpp"
@@ -156,7 +155,7 @@ TEST_F(TransferFault, ABoardThatPausesWithinAFrameIsWaitedFor) {
   board_.usb().send(Bytes(16, 0x40));
   const std::vector<Frame> frames = take(*sensor_, 1);
   ASSERT_EQ(frames.size(), 1U);
-  EXPECT_NEAR(frames[0].values.at(19), expected_kpa(0x101, 0x101), kpa_tolerance);
+  EXPECT_EQ(frames[0].values.at(19), expected_kpa(0x101, 0x101));
   EXPECT_EQ(frames[0].lost_before, 0U);
   EXPECT_EQ(sensor_->counters().garbage_bytes, 0U);
   EXPECT_EQ(sensor_->counters().reconnects, 0U);

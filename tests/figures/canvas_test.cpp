@@ -78,13 +78,6 @@ TEST(Canvas, ShortensTextToTheWidth) {
   EXPECT_EQ(canvas.fit(text, 0.0, font), "…");
 }
 
-TEST(Canvas, GoesOnAfterTextThatIsNotUtf8) {
-  Canvas canvas(40, 40);
-  canvas.text("\xC3\x28 \xFF", {0.0, 20.0}, {});
-  canvas.disc({20.0, 30.0}, 5.0, {});
-  EXPECT_EQ(decode(canvas.encode()).at(20, 30), 0u);
-}
-
 /// Relative luminance of an sRGB colour (IEC 61966-2-1).
 double luminance(const Colour& c) {
   const auto linear = [](double v) {
