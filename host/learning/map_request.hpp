@@ -6,11 +6,9 @@
 #include <vector>
 
 #include "options/request.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
-#include "palpate/rotational_symmetry.hpp"
 
 namespace palpate {
 

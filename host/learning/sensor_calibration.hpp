@@ -9,7 +9,7 @@
 #include "learning/cross_validation.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "palpate/setup_finding.hpp"
+#include "palpate/touch.hpp"
 
 namespace palpate {
 

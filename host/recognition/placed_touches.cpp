@@ -10,7 +10,7 @@
 #include <glm/matrix.hpp>
 
 #include "estimation/lattice/refinement.hpp"
-#include "model/contact_readings.hpp"
+#include "model/touch_evidence.hpp"
 #include "recognition/belief_cells.hpp"
 
 namespace palpate {

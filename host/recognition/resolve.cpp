@@ -10,7 +10,6 @@
 #include "io/input_file.hpp"
 #include "model/printable.hpp"
 #include "options/option.hpp"
-#include "options/refused_option.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
 #include "recognition/filter_choice.hpp"

@@ -6,7 +6,6 @@
 
 #include "arrays.hpp"
 #include "palpate/estimate.hpp"
-#include "palpate/plan.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate::python {

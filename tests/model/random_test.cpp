@@ -38,19 +38,6 @@ TEST(Random, NormalIsOfAStandardGaussianWithItsTails) {
                      [](double z) { return std::erfc(-z / std::sqrt(2.0)) / 2.0; });
 }
 
-TEST(Random, SuccessiveNormalsAreUncorrelated) {
-  Random random(3, Stream::sensor);
-  double sum = 0.0;
-  double previous = random.normal();
-  for (int i = 0; i < draws; ++i) {
-    const double next = random.normal();
-    sum += previous * next;
-    previous = next;
-  }
-  // Five standard errors: products of independent standard normals have unit variance.
-  EXPECT_NEAR(sum / draws, 0.0, 5.0 / std::sqrt(draws));
-}
-
 TEST(Random, EngineIsTheSameOnEveryStandardLibrary) {
   // Computed apart from this program, from the definitions of seed_seq and MT19937-64.
   Random random(42, Stream::touch_poses);

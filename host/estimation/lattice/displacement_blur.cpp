@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -269,7 +270,7 @@ void DisplacementBlur::turn_for(const glm::dvec2& sensor_from_pivot_mm) {
   host_turns_.assign(static_cast<std::size_t>(thetas) * turns,
                      {.whole_x = beyond, .whole_y = beyond});
   for (int theta = 0; theta < thetas; ++theta) {
-    weights_.find_taps(theta, sensor_from_pivot_mm, taps_);
+    taps_ = weights_.taps(theta, sensor_from_pivot_mm, std::move(taps_));
     for (const Tap& tap : taps_) {
       shaders::TurnedPlane& turn =
           host_turns_[static_cast<std::size_t>(theta) * turns + tap.steps + steps];
