@@ -6,6 +6,7 @@
 
 #include "estimation/hypotheses.hpp"
 #include "model/random.hpp"
+#include "palpate/pose.hpp"
 
 namespace palpate {
 
@@ -30,13 +31,14 @@ void for_runs(std::span<const std::int64_t> grid_bins, const Visit& visit) {
 /// Adds the probabilities of a box's bins, exp(log-likelihood - reference + log_scale), to the sums
 /// of the grid's bins in which their centres lie. At one theta these depend on one axis each.
 void add(const BinBox& box, std::span<const double> log_likelihood, double reference,
-         double log_scale, PoseLattice from, Marginals& sums) {
+         double log_scale, const PoseLattice& from, Marginals& sums) {
+  const double theta_rad = from.theta_rad.centre(box.theta);
+  const glm::dvec2 shift_mm = rotate(theta_rad, sums.grid.pivot_mm - from.pivot_mm);
   PoseLattice to = sums.grid;
-  to.pivot_mm -= from.pivot_mm;  // of equal pivots nothing rounds
-  from.pivot_mm = {};
+  to.pivot_mm = {};
   const auto bin_at = [&](int column, int row) {
-    return to.bin_of(from.T_object_robot(from.x_mm.centre(column), from.y_mm.centre(row),
-                                         from.theta_rad.centre(box.theta)));
+    const glm::dvec2 place_mm(from.x_mm.centre(column), from.y_mm.centre(row));
+    return to.bin_of({place_mm + shift_mm, 0.0});
   };
   std::vector<std::int64_t> columns;
   for (int i = 0; i < box.x_count; ++i) {
@@ -66,7 +68,7 @@ void add(const BinBox& box, std::span<const double> log_likelihood, double refer
       }
     }
   }
-  sums.theta[bin_at(box.x_first, box.y_first) / to.plane()] += all;
+  sums.theta[to.bin_of({{}, theta_rad}) / to.plane()] += all;
 }
 
 /// T_object_robot of a pose that is uniform within a bin.

@@ -22,7 +22,6 @@ TEST(MapOptions, OutOfRangeAreRefused) {
       {{.classifier = {.threshold = nan}}, "threshold"}, {{.sensor = {.peak = 1e-7}}, "peak"}};
   for (const double length : {0.0, -0.5, nan, infinity, 1e-7, 1.1e6, 1e154, 1e200}) {
     wrong.push_back({{.cell_mm = length}, "cell"});
-    wrong.push_back({{.sensor = {.spread_mm = length}}, "spread"});
   }
   for (const auto& [options, name] : wrong) {
     expect_named(input_error([&] { const MapBuilder builder(device, options); }), {name});
