@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iterator>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -35,22 +37,38 @@ NumberType read_number_type(const Entry& entry) {
                                    {"f32be", {Kind::real, 4, true}}});
 }
 
-Format::Check read_check(const Entry& field) {
+NumberType read_unsigned_type(const Entry& entry) {
+  const NumberType type = read_number_type(entry);
+  if (type.kind != NumberType::Kind::unsigned_integer) {
+    entry.refuse("give u8, u16le, u16be, u32le, u32be, u64le or u64be");
+  }
+  return type;
+}
+
+/// The place of the next field, which the format takes up.
+Format::Place next_place(Format& format, std::size_t bytes) {
+  const Format::Place place{format.bytes, bytes};
+  format.bytes += bytes;
+  return place;
+}
+
+// Each reader below appends a field to a format, whose `bytes` are those of the fields so far.
+
+void read_check(const Entry& field, Format& format) {
   using Kind = Checksum::Kind;
-  Checksum::Parameters options;
-  Format::Check check{.checksum = Checksum(options)};
+  Format::Check& check = format.check.emplace(Format::Check{});
+  Checksum& options = check.checksum;
   read_keys(field, {{"checksum",
                      [&](const Entry& e) {
-                       const auto kind = e.one_of<Checksum::Parameters>(
-                           {{"sum8", {.kind = Kind::sum, .bytes = 1}},
-                            {"sum16", {.kind = Kind::sum, .bytes = 2}},
-                            {"xor8", {.kind = Kind::exor, .bytes = 1}},
-                            {"crc8", {.kind = Kind::crc, .bytes = 1}},
-                            {"crc16", {.kind = Kind::crc, .bytes = 2}},
-                            {"crc32", {.kind = Kind::crc, .bytes = 4}},
-                            {"weiss16", {.kind = Kind::weiss, .bytes = 2}}});
-                       options.kind = kind.kind;
-                       options.bytes = kind.bytes;
+                       const auto kind =
+                           e.one_of<std::pair<Kind, std::size_t>>({{"sum8", {Kind::sum, 1}},
+                                                                   {"sum16", {Kind::sum, 2}},
+                                                                   {"xor8", {Kind::exor, 1}},
+                                                                   {"crc8", {Kind::crc, 1}},
+                                                                   {"crc16", {Kind::crc, 2}},
+                                                                   {"crc32", {Kind::crc, 4}},
+                                                                   {"weiss16", {Kind::weiss, 2}}});
+                       std::tie(options.kind, options.bytes) = kind;
                      }},
                     {"polynomial", whole_number(options.polynomial, 1)},
                     {"init", whole_number(options.init, 0)},
@@ -82,39 +100,41 @@ Format::Check read_check(const Entry& field) {
   if (std::max({options.polynomial, options.init, options.xor_out}) >= end) {
     field.refuse(fmt::format("shorten polynomial, init and xor_out to {} bits", 8 * options.bytes));
   }
-  check.checksum = Checksum(options);
-  return check;
+  // Bytes in front of the checksum in the shortest packet.
+  const std::size_t before = format.length ? format.head_bytes() : format.bytes;
+  if (!check.after && check.from_byte >= before) {
+    field.refuse(fmt::format("'from' is {}, but only {} bytes precede the checksum; lower it",
+                             check.from_byte, before));
+  }
+  if (check.after && (format.values || format.parts || check.from_byte != 0)) {
+    field.refuse("'covers: after' needs a checksum in front of the values, without 'from'");
+  }
+  check.place = next_place(format, options.bytes);
 }
 
-Format::Length read_length(const Entry& field) {
-  Format::Length length;
-  read_keys(field, {{"length",
-                     [&](const Entry& e) {
-                       length.type = read_number_type(e);
-                       if (length.type.kind != NumberType::Kind::unsigned_integer) {
-                         e.refuse("give u8, u16le, u16be, u32le, u32be, u64le or u64be");
-                       }
-                     }},
+void read_length(const Entry& field, Format& format) {
+  Format::Length& length = format.length.emplace(Format::Length{});
+  read_keys(field, {{"length", [&](const Entry& e) { length.type = read_unsigned_type(e); }},
                     {"extra", whole_number(length.extra, 0, most_packet_bytes)},
                     {"most", whole_number(length.most, 1, most_packet_bytes)}});
-  return length;
+  length.place = next_place(format, length.type.bytes);
 }
 
-Format::Time read_time(const Entry& field) {
-  Format::Time time;
+void read_time(const Entry& field, Format& format) {
+  Format::Clock clock;
   read_keys(field, {{"time",
                      [&](const Entry& e) {
-                       time.type = read_number_type(e);
-                       if (time.type.kind == NumberType::Kind::real) {
+                       clock.type = read_number_type(e);
+                       if (clock.type.kind == NumberType::Kind::real) {
                          e.refuse("give an integer type, such as u32le");
                        }
                      }},
-                    {"tick_s", [&](const Entry& e) { time.tick_s = e.number(1e-9, 1.0); }}});
-  return time;
+                    {"tick_s", [&](const Entry& e) { clock.tick_s = e.number(1e-9, 1.0); }}});
+  format.time = {next_place(format, clock.type.bytes), clock};
 }
 
-Format::Values read_values(const Entry& field) {
-  Format::Values values{.stride_bytes = 0};
+void read_values(const Entry& field, Format& format) {
+  Format::Values& values = format.values.emplace(Format::Values{});
   read_keys(field, {{"values", [&](const Entry& e) { values.type = read_number_type(e); }},
                     {"stride", whole_number(values.stride_bytes, 1, 256)},
                     {"at", whole_number(values.at_byte, 0, 255)}});
@@ -125,189 +145,131 @@ Format::Values read_values(const Entry& field) {
     field.refuse(fmt::format("a value at byte {} does not fit a stride of {}; enlarge 'stride'",
                              values.at_byte, values.stride_bytes));
   }
-  return values;
+  values.place = next_place(format, format.elements * values.stride_bytes);
 }
 
-Format::Part read_part(const Entry& entry, std::size_t elements) {
+Format::Part read_part(const Entry& entry, const NumberType& type, std::size_t elements) {
   Format::Part part;
   std::optional<std::uint8_t> tag;
+  std::size_t skip = 0;
   double tick_s = 0.0;
   read_keys(entry, {{"tag", whole_number(tag, 0, 255)},
                     {"mask", whole_number(part.mask, 0, 255)},
                     {"values", whole_number(part.values, 1, static_cast<std::uint32_t>(elements))},
-                    {"skip", whole_number(part.skip, 0, 4096)},
+                    {"skip", whole_number(skip, 0, 4096)},
                     {"time",
                      [&](const Entry& e) {
-                       part.time = {read_number_type(e), 0.0};
+                       part.clock = {read_unsigned_type(e), 0.0};
                      }},
                     {"tick_s", [&](const Entry& e) { tick_s = e.number(1e-9, 1.0); }}});
   if (!tag) {
     entry.refuse("key 'tag' is missing; add the byte that the part begins with");
   }
   part.tag = *tag;
-  if ((part.values > 0 ? 1 : 0) + (part.skip > 0 ? 1 : 0) + (part.time ? 1 : 0) > 1) {
+  if ((part.values > 0 ? 1 : 0) + (skip > 0 ? 1 : 0) + (part.clock ? 1 : 0) > 1) {
     entry.refuse("a part has either 'values', 'time' or 'skip'; remove one");
   }
-  if (part.time) {
-    if (part.time->type.kind != NumberType::Kind::unsigned_integer) {
-      entry.refuse("'time' is an unsigned integer, such as u64be; correct it");
-    }
-    part.time->tick_s = tick_s;
-    part.skip = part.time->type.bytes;
+  if (part.clock) {
+    part.clock->tick_s = tick_s;
+    skip = part.clock->type.bytes;
   }
+  part.bytes = 1 + skip + part.values * type.bytes;
   return part;
 }
 
-Format::Parts read_parts(const Entry& field, std::size_t elements) {
-  Format::Parts parts;
-  read_keys(field, {{"parts", [&](const Entry& e) { parts.type = read_number_type(e); }},
-                    {"tags", [&](const Entry& e) {
-                       for (const Entry& part : e.list("give a list of {tag: ..., values: N}")) {
-                         parts.parts.push_back(read_part(part, elements));
-                       }
-                     }}});
+void read_parts(const Entry& field, Format& format) {
+  Format::Parts& parts = format.parts.emplace(Format::Parts{});
+  std::vector<Entry> tags;
+  read_keys(
+      field,
+      {{"parts", [&](const Entry& e) { parts.type = read_number_type(e); }},
+       {"tags", [&](const Entry& e) { tags = e.list("give a list of {tag: ..., values: N}"); }}});
   std::size_t values = 0;
-  for (const Format::Part& part : parts.parts) {
+  for (const Entry& tag : tags) {
+    Format::Part& part = parts.list.emplace_back(read_part(tag, parts.type, format.elements));
+    part.first_element = values;
     values += part.values;
   }
-  if (values != elements) {
+  if (values != format.elements) {
     field.refuse(
         fmt::format("the parts carry {} values, but there are {} elements; correct the "
                     "'values' of the tags or 'elements'",
-                    values, elements));
+                    values, format.elements));
   }
-  return parts;
+  // Without a Length, a packet carries one part.
+  const std::size_t bytes = parts.list.front().bytes;
+  if (!format.length && !std::ranges::all_of(parts.list, [&](const Format::Part& part) {
+        return part.bytes == bytes;
+      })) {
+    field.refuse("parts differ in size, so that packets need a 'length'; add it");
+  }
+  parts.place = next_place(format, format.length ? 0 : bytes);
 }
 
-std::vector<std::uint8_t> read_only_bytes(const Entry& field, std::string_view kind) {
-  std::vector<std::uint8_t> bytes;
-  read_keys(field, {{kind, [&](const Entry& e) { bytes = read_bytes(e); }}});
-  return bytes;
+Format::Pattern read_pattern(const Entry& field, std::string_view kind, Format& format) {
+  Format::Pattern pattern;
+  read_keys(field, {{kind, [&](const Entry& e) { pattern.bytes = read_bytes(e); }}});
+  pattern.place = next_place(format, pattern.bytes.size());
+  return pattern;
 }
 
-Format::Skip read_skip(const Entry& field) {
-  Format::Skip skip;
-  read_keys(field, {{"skip", whole_number(skip.bytes, 1, 4096)}});
-  return skip;
+void read_skip(const Entry& field, Format& format) {
+  std::size_t bytes = 0;
+  read_keys(field, {{"skip", whole_number(bytes, 1, 4096)}});
+  next_place(format, bytes);
 }
 
-Format::Field read_field(const Entry& field, std::size_t elements) {
+void read_fixed(const Entry& field, Format& format) {
+  format.fixed.push_back(read_pattern(field, "bytes", format));
+}
+
+void read_only(const Entry& field, Format& format) {
+  format.only.push_back(read_pattern(field, "only", format));
+}
+
+/// One key names the field's kind; the other keys are its options, which the kind's reader checks.
+struct FieldKind {
+  std::string_view key;
+  void (*read)(const Entry& field, Format& format);
+};
+
+const FieldKind& kind_of(const Entry& field) {
+  static constexpr FieldKind all[] = {{"bytes", read_fixed}, {"only", read_only},
+                                      {"skip", read_skip},   {"length", read_length},
+                                      {"time", read_time},   {"values", read_values},
+                                      {"parts", read_parts}, {"checksum", read_check}};
   constexpr const char* kinds = "bytes, only, skip, length, time, values, parts, checksum";
   if (!field.node.IsMap()) {
     field.refuse(fmt::format("give a field such as {{skip: 1}}; the fields are {}", kinds));
   }
-  // One key names the field's kind; the other keys are its options, which the kind's reader checks.
-  const std::pair<std::string_view, std::function<Format::Field()>> readers[] = {
-      {"bytes", [&] { return Format::Fixed{read_only_bytes(field, "bytes")}; }},
-      {"only", [&] { return Format::Only{read_only_bytes(field, "only")}; }},
-      {"skip", [&] { return read_skip(field); }},
-      {"length", [&] { return read_length(field); }},
-      {"time", [&] { return read_time(field); }},
-      {"values", [&] { return read_values(field); }},
-      {"parts", [&] { return read_parts(field, elements); }},
-      {"checksum", [&] { return read_check(field); }}};
-  for (const auto& reader : readers) {
+  for (const FieldKind& kind : all) {
     const auto is_kind = [&](const auto& item) {
-      return item.first.IsScalar() && item.first.Scalar() == reader.first;
+      return item.first.IsScalar() && item.first.Scalar() == kind.key;
     };
     if (std::any_of(field.node.begin(), field.node.end(), is_kind)) {
-      return reader.second();
+      return kind;
     }
   }
   field.refuse(fmt::format("unknown field; the fields are {}", kinds));
 }
 
-template <class Field>
-std::size_t count_of(const Format& format) {
-  return static_cast<std::size_t>(std::count_if(
-      format.fields.begin(), format.fields.end(),
-      [](const Format::Field& field) { return std::holds_alternative<Field>(field); }));
-}
-
-void check_counts(const Entry& packet, const Format& format) {
-  if (count_of<Format::Values>(format) + count_of<Format::Parts>(format) != 1) {
-    packet.refuse("give exactly one field 'values' or 'parts'");
-  }
-  if (count_of<Format::Length>(format) > 1 || count_of<Format::Time>(format) > 1 ||
-      count_of<Format::Check>(format) > 1) {
-    packet.refuse("give 'length', 'time' and 'checksum' at most once each; remove one");
-  }
-  if (!std::holds_alternative<Format::Fixed>(format.fields.front()) &&
-      !std::holds_alternative<Format::Fixed>(format.fields.back())) {
-    packet.refuse("nothing marks a packet; begin or end it with 'bytes'");
-  }
-}
-
-// Without a Length, a packet carries one part, so that all parts must have one size.
-void check_parts(const Entry& field, const Format::Parts& parts, bool counted) {
-  for (const Format::Part& part : parts.parts) {
-    if (!counted && bytes_of(parts, part) != bytes_of(parts, parts.parts.front())) {
-      field.refuse("parts differ in size, so that packets need a 'length'; add it");
-    }
-  }
-}
-
-// Behind a Length, a field's place is known only in packets with values, except in the tail.
-void check_places(const std::vector<Entry>& entries, const Format& format) {
-  const PacketLayout layout(format);
-  for (std::size_t i = 0; i < format.fields.size(); ++i) {
-    const Format::Field& field = format.fields[i];
-    const bool in_middle = layout.has_length() && i >= layout.middle() && i < layout.tail();
-    if (in_middle && std::holds_alternative<Format::Fixed>(field)) {
-      entries[i].refuse("behind 'length', only the end has 'bytes'; write 'only' instead");
-    }
-    if (in_middle && std::holds_alternative<Format::Check>(field)) {
-      entries[i].refuse("put 'checksum' before 'length' or at the end");
-    }
-    if (i < layout.middle() && (std::holds_alternative<Format::Values>(field) ||
-                                std::holds_alternative<Format::Parts>(field))) {
-      entries[i].refuse("put 'values' or 'parts' behind 'length'");
-    }
-    if (const auto* check = std::get_if<Format::Check>(&field)) {
-      // Bytes in front of the checksum in the shortest packet.
-      const std::size_t before =
-          layout.offset(layout.has_length() && i >= layout.tail() ? layout.middle() : i);
-      if (!check->after && check->from_byte >= before) {
-        entries[i].refuse(
-            fmt::format("'from' is {}, but only {} bytes precede the checksum; lower it",
-                        check->from_byte, before));
-      }
-      if (check->after && (i >= layout.tail() || check->from_byte != 0)) {
-        entries[i].refuse(
-            "'covers: after' needs a checksum in front of the values, without 'from'");
-      }
-    }
-    if (const auto* parts = std::get_if<Format::Parts>(&field)) {
-      check_parts(entries[i], *parts, layout.has_length());
-    }
-    if (layout.offset(i + 1) > most_packet_bytes) {
-      entries[i].refuse(fmt::format(
-          "a packet is longer than {} bytes; give fewer elements or fields", most_packet_bytes));
-    }
-  }
-}
-
 // By default, no packet is larger than the packet with the values.
-void set_most(const std::vector<Entry>& entries, Format& format) {
-  const PacketLayout layout(format);
-  for (std::size_t i = 0; i < format.fields.size(); ++i) {
-    if (auto* length = std::get_if<Format::Length>(&format.fields[i])) {
-      if (length->most == 0 && layout.has_parts()) {
-        entries[i].refuse("add 'most', the largest number of bytes that 'length' counts");
-      }
-      length->most = length->most == 0 ? layout.middle_bytes() : length->most;
-      if (layout.has_parts() && count_of<Format::Check>(format) == 0 &&
-          length->most > most_unchecked_parts_bytes) {
-        entries[i].refuse(
-            fmt::format("'most' is {}, but parts without a checksum have at most {} "
-                        "bytes; lower it, or add 'checksum'",
-                        length->most, most_unchecked_parts_bytes));
-      }
-      if (length->most < layout.middle_bytes()) {
-        entries[i].refuse(fmt::format("'most' is {}, but the values take {} bytes; enlarge it",
-                                      length->most, layout.middle_bytes()));
-      }
-    }
+void set_most(const Entry& entry, Format& format) {
+  std::size_t& most = format.length->most;
+  const std::size_t middle_bytes = format.tail - format.head_bytes();
+  if (most == 0 && format.parts) {
+    entry.refuse("add 'most', the largest number of bytes that 'length' counts");
+  }
+  most = most == 0 ? middle_bytes : most;
+  if (format.parts && !format.check && most > most_unchecked_parts_bytes) {
+    entry.refuse(
+        fmt::format("'most' is {}, but parts without a checksum have at most {} "
+                    "bytes; lower it, or add 'checksum'",
+                    most, most_unchecked_parts_bytes));
+  }
+  if (most < middle_bytes) {
+    entry.refuse(
+        fmt::format("'most' is {}, but the values take {} bytes; enlarge it", most, middle_bytes));
   }
 }
 
@@ -340,18 +302,60 @@ std::vector<std::uint8_t> read_bytes(const YamlEntry& entry, std::size_t least) 
 
 PacketFormat read_packet_format(const YamlEntry& packet, std::size_t elements) {
   constexpr std::size_t most_fields = 64;
-  PacketFormat format;
-  format.elements = elements;
   const std::vector<Entry> entries = packet.list("give a list of fields");
   if (entries.empty() || entries.size() > most_fields) {
     packet.refuse(fmt::format("give 1 to {} fields", most_fields));
   }
-  for (const Entry& entry : entries) {
-    format.fields.push_back(read_field(entry, elements));
+  std::vector<FieldKind> kinds;
+  std::ranges::transform(entries, std::back_inserter(kinds), kind_of);
+  const auto count = [&](std::string_view key) {
+    return std::ranges::count(kinds, key, &FieldKind::key);
+  };
+  if (count("values") + count("parts") != 1) {
+    packet.refuse("give exactly one field 'values' or 'parts'");
   }
-  check_counts(packet, format);
-  check_places(entries, format);
-  set_most(entries, format);
+  if (count("length") > 1 || count("time") > 1 || count("checksum") > 1) {
+    packet.refuse("give 'length', 'time' and 'checksum' at most once each; remove one");
+  }
+  if (kinds.front().key != "bytes" && kinds.back().key != "bytes") {
+    packet.refuse("nothing marks a packet; begin or end it with 'bytes'");
+  }
+  const auto length = std::ranges::find(kinds, "length", &FieldKind::key);
+  const auto middle = length == kinds.end() ? kinds.begin() : length + 1;
+  auto tail = kinds.end();
+  while (tail != middle && ((tail - 1)->key == "checksum" || (tail - 1)->key == "bytes")) {
+    --tail;
+  }
+
+  PacketFormat format;
+  format.elements = elements;
+  for (auto kind = kinds.begin(); kind != kinds.end(); ++kind) {
+    const Entry& entry = entries[static_cast<std::size_t>(kind - kinds.begin())];
+    // Behind a Length, a field's place is known only in packets with values, except in the tail.
+    if (format.length && kind < tail && kind->key == "bytes") {
+      entry.refuse("behind 'length', only the end has 'bytes'; write 'only' instead");
+    }
+    if (format.length && kind < tail && kind->key == "checksum") {
+      entry.refuse("put 'checksum' before 'length' or at the end");
+    }
+    if (kind < middle && (kind->key == "values" || kind->key == "parts")) {
+      entry.refuse("put 'values' or 'parts' behind 'length'");
+    }
+    kind->read(entry, format);
+    if (format.bytes > most_packet_bytes) {
+      entry.refuse(fmt::format("a packet is longer than {} bytes; give fewer elements or fields",
+                               most_packet_bytes));
+    }
+    format.tail = kind < tail ? format.bytes : format.tail;
+  }
+  if (format.length) {
+    set_most(entries[static_cast<std::size_t>(length - kinds.begin())], format);
+  }
+  if (kinds.front().key == "bytes") {
+    format.preamble = format.fixed.front().bytes;
+  } else {
+    format.terminator = format.fixed.back().bytes;
+  }
   return format;
 }
 

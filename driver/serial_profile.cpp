@@ -27,22 +27,15 @@ bool is_profile_path(const std::string& name) {
 
 std::filesystem::path profile_folder() { return data_folder() / "profiles"; }
 
-[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& message) {
-  throw Error(Fault::input, fmt::format("{}: {}", path.string(), message));
-}
-
 std::string text_of(const std::filesystem::path& path) {
-  constexpr std::uintmax_t most_bytes = 1 << 20;
   std::error_code failure;
-  if (!std::filesystem::is_regular_file(path, failure)) {
-    refuse(path, "no such profile; check the path");
+  std::ifstream file;
+  if (std::filesystem::is_regular_file(path, failure)) {
+    file.open(path, std::ios::binary);
   }
-  if (std::filesystem::file_size(path, failure) > most_bytes) {
-    refuse(path, "larger than 1 MiB, so that it is no profile; check the path");
-  }
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    refuse(path, "cannot be read; check its permissions");
+  if (!file.is_open()) {
+    throw Error(Fault::input,
+                fmt::format("{}: no such profile that can be read; check the path", path.string()));
   }
   return {std::istreambuf_iterator<char>(file), {}};
 }
@@ -134,7 +127,6 @@ std::vector<glm::dvec2> read_elements_mm(const Entry& entry) {
 
 SerialProfile read_root(const Entry& root) {
   SerialProfile profile;
-  profile.path = root.file;
   std::optional<Entry> packet;
   double gain = 1.0;
   double offset = 0.0;

@@ -2,13 +2,11 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
-#include "driver/deframer.hpp"
 #include "driver/device.hpp"
 #include "driver/packet_format.hpp"
 
@@ -25,9 +23,8 @@ struct SerialLine {
 
 /// What a profile says of a board behind a serial port.
 struct SerialProfile {
-  std::filesystem::path path;  ///< the profile's file
-  std::string name;            ///< for people, such as "Robotiq TSF-85"
-  std::vector<UsbId> usb;      ///< empty if unknown: the user must say which device it is
+  std::string name;        ///< for people, such as "Robotiq TSF-85"
+  std::vector<UsbId> usb;  ///< empty if unknown: the user must say which device it is
   SerialLine line;
   std::vector<std::uint8_t> start;      ///< bytes that make the board send frames; may be empty
   std::vector<std::uint8_t> stop;       ///< bytes that make the board stop; may be empty
@@ -53,8 +50,5 @@ SerialProfile read_serial_profile(const std::string& name_or_path);
 
 /// Reads a profile from its text. @param path names it in messages
 SerialProfile parse_serial_profile(const std::string& yaml, const std::filesystem::path& path);
-
-/// Makes a deframer for the profile's stream, which takes the stream in pieces of any size.
-std::unique_ptr<Deframer> make_deframer(const SerialProfile& profile);
 
 }  // namespace palpate

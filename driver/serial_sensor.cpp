@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -15,14 +17,14 @@
 #include <grp.h>
 #include <linux/serial.h>
 #include <poll.h>
-#include <sys/eventfd.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 
+#include "driver/deframer.hpp"
 #include "driver/device.hpp"
-#include "driver/frame_queue.hpp"
 #include "driver/open_sensor.hpp"
+#include "driver/queued_sensor.hpp"
 #include "driver/serial_profile.hpp"
 #include "model/descriptor.hpp"
 #include "model/stream_time.hpp"
@@ -120,17 +122,13 @@ class SerialPort {
     }
   }
 
-  /// Waits until bytes come or the device goes, or until `wake` is readable, which it returns.
-  bool wait(const Descriptor& wake) {
-    pollfd files[] = {{.fd = port_.get(), .events = POLLIN, .revents = 0},
-                      {.fd = wake.get(), .events = POLLIN, .revents = 0}};
-    poll(files, 2, -1);
-    return (files[1].revents & POLLIN) != 0;
-  }
-
-  /// Takes what came, up to the room in `buffer`: nothing where nothing came.
+  /// Takes the bytes that come, up to the room in `buffer`: none where none come in time.
   /// @throws Error where the device is gone
   std::span<const std::uint8_t> read(std::span<std::uint8_t> buffer) {
+    // How long stop() waits for a silent board.
+    constexpr int patience_ms = 50;
+    pollfd file{.fd = port_.get(), .events = POLLIN, .revents = 0};
+    poll(&file, 1, patience_ms);
     const ssize_t count = ::read(port_.get(), buffer.data(), buffer.size());
     if (count > 0) {
       return buffer.first(static_cast<std::size_t>(count));
@@ -149,14 +147,6 @@ class SerialPort {
   std::string node_;
   Descriptor port_;
 };
-
-int new_event() {
-  const int event = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  if (event < 0) {
-    throw Error(Fault::system, "serial port: too many open files; close some");
-  }
-  return event;
-}
 
 /// A sensor that streams from a board behind a serial port. Once the board is gone, next() throws
 /// until start() finds it again.
@@ -180,6 +170,7 @@ class SerialSensor final : public QueuedSensor {
     stop();
     forget();
     begin();
+    stopping_ = false;
     thread_ = std::thread([this] { run(); });
   }
 
@@ -187,10 +178,8 @@ class SerialSensor final : public QueuedSensor {
     if (!thread_.joinable()) {
       return;
     }
-    eventfd_write(stopping_.get(), 1);
+    stopping_ = true;
     thread_.join();
-    eventfd_t count = 0;
-    eventfd_read(stopping_.get(), &count);
     try {
       if (port_) {
         port_->write(profile_.stop);
@@ -234,17 +223,16 @@ class SerialSensor final : public QueuedSensor {
     if (!port_) {  // a board that was unplugged since is a new device to the kernel
       connect();
     }
-    deframer_ = make_deframer(profile_);
+    deframer_.emplace(profile_.packet);
     port_->write(profile_.start);
   }
 
   void run() {
     try {
       std::vector<std::uint8_t> buffer(1 << 16);
-      for (bool stopping = false; !stopping;) {
-        stopping = port_->wait(stopping_);
+      do {
         deliver(port_->read(buffer));
-      }
+      } while (!stopping_);
     } catch (...) {
       port_.reset();  // a port that hung up would keep its name from the board that comes back
       fail();
@@ -254,16 +242,15 @@ class SerialSensor final : public QueuedSensor {
   void deliver(std::span<const std::uint8_t> bytes) {
     const double host_time_s = host_clock_s();
     parsed_.clear();
-    const std::uint64_t damaged_before = deframer_->counters().checksum_errors;
+    const std::uint64_t lost_before = deframer_->counters().checksum_errors;
     deframer_->push(bytes, parsed_);
-    const DeframerCounters& counted = deframer_->counters();
-    lose(counted.checksum_errors - damaged_before);
-    for (ParsedFrame& frame : parsed_) {
+    SensorCounters counters = deframer_->counters();
+    counters.lost = counters.checksum_errors;
+    lose(counters.lost - lost_before);
+    for (Frame& frame : parsed_) {
       push(std::move(frame), host_time_s);
     }
-    publish({.lost = counted.checksum_errors,
-             .checksum_errors = counted.checksum_errors,
-             .garbage_bytes = counted.garbage_bytes});
+    publish(counters);
   }
 
   SerialProfile profile_;
@@ -272,9 +259,10 @@ class SerialSensor final : public QueuedSensor {
 
   // Between start() and stop(), only the sensor's thread reads the port and uses these.
   std::unique_ptr<SerialPort> port_;
-  std::unique_ptr<Deframer> deframer_;
-  std::vector<ParsedFrame> parsed_;
-  Descriptor stopping_{new_event()};  // readable once stop() is called
+  std::optional<PacketDeframer> deframer_;
+  std::vector<Frame> parsed_;
+
+  std::atomic<bool> stopping_ = false;
 };
 
 }  // namespace

@@ -97,39 +97,40 @@ double pressure_kpa(const Calibration& calibration, std::uint16_t raw_pressure,
   return 50.0 + compensated * (115.0 - 50.0) / 1023.0;
 }
 
-Deframer::Deframer(std::vector<Calibration> calibrations) : calibrations_(std::move(calibrations)) {
-  frame_.reserve(frame_bytes());
-}
+Deframer::Deframer(std::vector<Calibration> calibrations, std::uint64_t& garbage_bytes)
+    : calibrations_(std::move(calibrations)), garbage_bytes_(garbage_bytes) {}
 
 void Deframer::reset() {
   frame_.clear();
   frame_fits_ = true;
 }
 
-void Deframer::push(std::span<const std::uint8_t> packet, std::vector<ParsedFrame>& frames) {
-  if (frame_fits_ && packet.size() <= frame_bytes() - frame_.size()) {
-    frame_.insert(frame_.end(), packet.begin(), packet.end());
+std::optional<Frame> Deframer::push(std::span<const std::uint8_t> bytes, bool ended) {
+  const std::size_t frame_bytes = 4 * calibrations_.size();
+  if (frame_fits_ && frame_.size() + bytes.size() <= frame_bytes) {
+    frame_.insert(frame_.end(), bytes.begin(), bytes.end());
   } else {
     // More bytes than a frame: an end was lost. Decoding starts again after the next end.
-    counters_.garbage_bytes += frame_.size() + packet.size();
+    garbage_bytes_ += frame_.size() + bytes.size();
     frame_.clear();
     frame_fits_ = false;
   }
-  if (packet.size() >= packet_bytes) {
-    return;
+  if (!ended) {
+    return std::nullopt;
   }
-  if (frame_fits_ && !frame_.empty() && frame_.size() == frame_bytes()) {
-    ParsedFrame& frame = frames.emplace_back();
-    frame.values.reserve(calibrations_.size());
+  std::optional<Frame> frame;
+  if (frame_.size() == frame_bytes) {
+    frame.emplace();
     for (std::size_t cell = 0; cell < calibrations_.size(); ++cell) {
-      const std::uint8_t* bytes = &frame_[4 * cell];
-      frame.values.push_back(pressure_kpa(calibrations_[cell], reading(bytes[0], bytes[1]),
-                                          reading(bytes[2], bytes[3])));
+      const std::uint8_t* read = &frame_[4 * cell];
+      frame->values.push_back(
+          pressure_kpa(calibrations_[cell], reading(read[0], read[1]), reading(read[2], read[3])));
     }
   } else {
-    counters_.garbage_bytes += frame_.size();
+    garbage_bytes_ += frame_.size();
   }
   reset();
+  return frame;
 }
 
 }  // namespace palpate::takktile

@@ -1,22 +1,26 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
-#include "driver/deframer.hpp"
 #include "driver/device.hpp"
+#include "palpate/sensor.hpp"
 
 namespace palpate::takktile {
 
-// Vendor requests of the published firmware, TakkTile-usb: firmware/main.c, and TakkTile.py for the
-// calibration. All are IN requests to the device, also the request that starts and stops the
-// stream.
+// The interface and the bulk endpoint towards the host of the published firmware, TakkTile-usb:
+// firmware/Descriptors.c.
 inline constexpr UsbId usb_id{.vendor = 0x59e3, .product = 0x74c7};
+inline constexpr int usb_interface = 0;
+inline constexpr std::uint8_t usb_endpoint = 0x81;
 inline constexpr std::size_t packet_bytes = 64;
 
+// Its vendor requests: firmware/main.c, and TakkTile.py for the calibration. All are IN requests to
+// the device, also the request that starts and stops the stream.
 inline constexpr std::uint8_t request_alive_map = 0x5c;    ///< ask for alive_map_request_bytes
 inline constexpr std::uint8_t request_calibration = 0x6c;  ///< wValue column, wIndex row
 inline constexpr std::uint8_t request_stream = 0xc7;       ///< wValue ticks, wIndex 0: stop
@@ -72,25 +76,23 @@ Calibration parse_calibration(std::span<const std::uint8_t> reply);
 double pressure_kpa(const Calibration& calibration, std::uint16_t raw_pressure,
                     std::uint16_t raw_temperature);
 
-/// Decodes the bulk stream, one packet per push. A frame has 4 bytes per cell that is alive and
-/// ends with a packet of fewer than packet_bytes, perhaps an empty packet.
+/// Decodes the bulk stream. A frame has 4 bytes per cell that is alive and ends with a packet of
+/// fewer than packet_bytes, perhaps an empty packet.
 class Deframer {
  public:
   /// @param calibrations [cell] in the order of parse_alive_map()
-  explicit Deframer(std::vector<Calibration> calibrations);
+  /// @param garbage_bytes counts the bytes that belong to no frame; must outlive this object
+  Deframer(std::vector<Calibration> calibrations, std::uint64_t& garbage_bytes);
 
-  void push(std::span<const std::uint8_t> packet, std::vector<ParsedFrame>& frames);
+  /// Takes the next bytes. Where they end a frame and its length is right, returns it.
+  std::optional<Frame> push(std::span<const std::uint8_t> bytes, bool ended);
   void reset();
-  const DeframerCounters& counters() const { return counters_; }
-
-  /// Size of a frame in bytes.
-  std::size_t frame_bytes() const { return 4 * calibrations_.size(); }
 
  private:
   std::vector<Calibration> calibrations_;
+  std::uint64_t& garbage_bytes_;
   std::vector<std::uint8_t> frame_;  // the bytes of the frame in progress
   bool frame_fits_ = true;           // false: the frame is too long, and skipped up to its end
-  DeframerCounters counters_;
 };
 
 }  // namespace palpate::takktile

@@ -1,11 +1,8 @@
-#include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -13,11 +10,10 @@
 
 #include <fmt/format.h>
 
-#include "driver/frame_queue.hpp"
 #include "driver/open_sensor.hpp"
+#include "driver/queued_sensor.hpp"
 #include "driver/serial_profile.hpp"
 #include "driver/takktile_protocol.hpp"
-#include "driver/transfer_ring.hpp"
 #include "driver/usb_device.hpp"
 #include "palpate/error.hpp"
 
@@ -66,13 +62,12 @@ Setup read_setup(UsbHandle& handle) {
 class Link {
  public:
   /// The context and the counters must outlive the link. @throws Error
-  Link(const UsbContext& context, const ListedDevice& device, TransferRing::Counters& counters)
+  Link(const UsbContext& context, const ListedDevice& device, SensorCounters& counters)
       : context_(context),
         counters_(counters),
         handle_(context, device),
-        stream_(handle_.vendor_interface()),
-        setup_((handle_.claim(stream_.number), read_setup(handle_))),
-        deframer_(setup_.calibrations) {}
+        setup_((handle_.claim(usb_interface), read_setup(handle_))),
+        deframer_(setup_.calibrations, counters.garbage_bytes) {}
 
   const SensorDescription& description() const { return setup_.description; }
 
@@ -80,7 +75,7 @@ class Link {
   void begin() {
     deframer_.reset();
     // The ring must be ready before the board sends.
-    ring_.emplace(context_, handle_, stream_.endpoint, transfer_packets * packet_bytes, counters_);
+    ring_.emplace(context_, handle_, usb_endpoint, transfer_packets * packet_bytes, counters_);
     try {
       handle_.control_in(request_stream, stream_reply_bytes, default_period_ticks, start_index);
     } catch (...) {
@@ -106,31 +101,10 @@ class Link {
   TransferRing& ring() { return *ring_; }
   Deframer& deframer() { return deframer_; }
 
-  /// Passes the bytes of a transfer to the deframer and appends the frames that they complete.
-  /// @return the number of frames known to be spoiled
-  std::uint64_t parse(const TransferRing::Completion& completion,
-                      std::vector<ParsedFrame>& frames) {
-    const std::size_t before = frames.size();
-    // The deframer takes single packets. A transfer that ended early behind full packets alone
-    // ended with an empty packet.
-    std::span<const std::uint8_t> rest = completion.bytes;
-    while (rest.size() >= packet_bytes) {
-      deframer_.push(rest.first(packet_bytes), frames);
-      rest = rest.subspan(packet_bytes);
-    }
-    if (completion.ended || !rest.empty()) {
-      deframer_.push(rest, frames);
-    }
-    // A transfer that ended without a frame had too few cells or too many.
-    const bool spoiled = completion.ended && !completion.bytes.empty() && frames.size() == before;
-    return spoiled ? 1 : 0;
-  }
-
  private:
   const UsbContext& context_;
-  TransferRing::Counters& counters_;
+  SensorCounters& counters_;
   UsbHandle handle_;
-  VendorInterface stream_;
   Setup setup_;
   Deframer deframer_;
   std::optional<TransferRing> ring_;
@@ -142,17 +116,9 @@ class Link {
 
 namespace {
 
-using std::chrono::duration_cast;
-using std::chrono::microseconds;
-using std::chrono::milliseconds;
-using std::chrono::steady_clock;
-
-// Waits between two looks for a board that is gone: short at first, as udev needs a moment to grant
-// permission; longer later, as the board may never come back.
-constexpr milliseconds first_back_off{50};
-constexpr milliseconds longest_back_off{1000};
-// Longest wait for events: stop() interrupts it, but an interrupt may be missed.
-constexpr milliseconds event_patience{100};
+// Longest wait for events, and so between two looks for a board that is gone: stop() interrupts it,
+// but an interrupt may be missed.
+constexpr suseconds_t event_patience_us = 100'000;
 
 /// The board came back with other elements, so that the stream cannot continue.
 class OtherElements : public Error {
@@ -160,14 +126,9 @@ class OtherElements : public Error {
   using Error::Error;
 };
 
-void handle_events(const UsbContext& context, microseconds patience) {
-  timeval time{.tv_sec = patience.count() / 1'000'000, .tv_usec = patience.count() % 1'000'000};
-  libusb_handle_events_timeout_completed(context.get(), &time, nullptr);
-}
-
-int on_arrival(libusb_context*, libusb_device*, libusb_hotplug_event, void* arrived) noexcept {
-  static_cast<std::atomic<bool>*>(arrived)->store(true);
-  return 0;  // stay registered
+void handle_events(const UsbContext& context) {
+  timeval patience{.tv_sec = 0, .tv_usec = event_patience_us};
+  libusb_handle_events_timeout_completed(context.get(), &patience, nullptr);
 }
 
 std::vector<ListedDevice> boards() { return with_id(usb_devices(), {takktile::usb_id}); }
@@ -183,9 +144,8 @@ class TakktileSensor final : public QueuedSensor {
     const std::vector<ListedDevice> listed = boards();
     const ListedDevice device = choose_device(listed, takktile_kind, which);
     which_ = distinction(device, listed);
-    link_ = std::make_unique<takktile::Link>(context_, device, transfer_counters_);
+    link_ = std::make_unique<takktile::Link>(context_, device, tally_);
     description_ = link_->description();
-    watch_arrivals();
   }
 
   ~TakktileSensor() override { stop(); }
@@ -193,12 +153,10 @@ class TakktileSensor final : public QueuedSensor {
   void start() override {
     stop();
     forget();
-    transfer_counters_ = {};
     tally_ = {};
     begin();
     gone_ = false;
     stopping_ = false;
-    back_off_ = first_back_off;
     thread_ = std::thread([this] { run(); });
   }
 
@@ -213,16 +171,6 @@ class TakktileSensor final : public QueuedSensor {
   }
 
  private:
-  void watch_arrivals() {
-    // Without hotplug events, wait_for_return() finds the board by looking at intervals.
-    if (libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) != 0) {
-      libusb_hotplug_register_callback(context_.get(), LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED,
-                                       LIBUSB_HOTPLUG_NO_FLAGS, LIBUSB_HOTPLUG_MATCH_ANY,
-                                       LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY,
-                                       on_arrival, &arrived_, nullptr);
-    }
-  }
-
   void begin() {
     if (link_) {
       try {
@@ -244,11 +192,11 @@ class TakktileSensor final : public QueuedSensor {
         } else {
           wait_for_return();
         }
-        publish_counts();
+        publish(tally_);
       }
       if (link_) {
         deliver(link_->end());
-        publish_counts();
+        publish(tally_);
       }
     } catch (...) {
       link_.reset();
@@ -257,11 +205,9 @@ class TakktileSensor final : public QueuedSensor {
   }
 
   void stream() {
-    handle_events(context_, event_patience);
+    handle_events(context_);
     TransferRing& ring = link_->ring();
-    std::vector<TransferRing::Completion> completions = ring.completed();
-    deliver(completions);
-    ring.recycle(std::move(completions));
+    deliver(ring.completed());
     if (ring.lost()) {
       let_go();
     } else if (ring.halted()) {
@@ -279,14 +225,7 @@ class TakktileSensor final : public QueuedSensor {
   }
 
   void wait_for_return() {
-    const auto end = steady_clock::now() + back_off_;
-    for (auto now = steady_clock::now(); !stopping_ && !arrived_ && now < end;
-         now = steady_clock::now()) {
-      handle_events(context_,
-                    std::min<microseconds>(duration_cast<microseconds>(end - now), event_patience));
-    }
-    back_off_ =
-        arrived_.exchange(false) ? first_back_off : std::min(2 * back_off_, longest_back_off);
+    handle_events(context_);
     if (stopping_) {
       return;
     }
@@ -303,7 +242,7 @@ class TakktileSensor final : public QueuedSensor {
 
   void reconnect() {
     const ListedDevice device = choose_device(boards(), takktile_kind, which_);
-    auto link = std::make_unique<takktile::Link>(context_, device, transfer_counters_);
+    auto link = std::make_unique<takktile::Link>(context_, device, tally_);
     const std::size_t elements = link->description().elements_mm.size();
     if (link->description().elements_mm != description_.elements_mm) {
       throw OtherElements(
@@ -317,45 +256,32 @@ class TakktileSensor final : public QueuedSensor {
   }
 
   void deliver(const std::vector<TransferRing::Completion>& completions) {
-    takktile::Deframer& deframer = link_->deframer();
+    const auto lose_frames = [this](std::uint64_t frames) {
+      lose(frames);
+      tally_.lost += frames;
+    };
     for (const TransferRing::Completion& completion : completions) {
       if (completion.missing > 0) {
         // A lower bound: each missing transfer held at least part of a frame.
-        deframer.reset();
-        lose(completion.missing);
-        tally_.lost += completion.missing;
+        link_->deframer().reset();
+        lose_frames(completion.missing);
       }
-      const std::uint64_t garbage_before = deframer.counters().garbage_bytes;
-      parsed_.clear();
-      const std::uint64_t spoiled = link_->parse(completion, parsed_);
-      tally_.garbage_bytes += deframer.counters().garbage_bytes - garbage_before;
-      tally_.lost += spoiled;
-      lose(spoiled);
-      for (ParsedFrame& frame : parsed_) {
-        push(std::move(frame), completion.host_time_s);
-        back_off_ = first_back_off;
+      // A transfer that was given up may end with a packet that is not full, too.
+      const bool ended = completion.ended || completion.bytes.size() % takktile::packet_bytes != 0;
+      if (auto frame = link_->deframer().push(completion.bytes, ended)) {
+        push(std::move(*frame), completion.host_time_s);
+      } else if (ended && !completion.bytes.empty()) {
+        lose_frames(1);  // it has too few cells or too many
       }
     }
   }
 
-  void publish_counts() {
-    SensorCounters counters = tally_;
-    counters.timeouts = transfer_counters_.timeouts;
-    counters.stalls = transfer_counters_.stalls;
-    counters.overflows = transfer_counters_.overflows;
-    publish(counters);
-  }
-
   UsbContext context_;
   std::string which_;  // serial number or port, by which a board that comes back is known
-  std::atomic<bool> arrived_ = false;  // a device was plugged in
 
   // Between start() and stop(), only the sensor's thread uses these.
-  TransferRing::Counters transfer_counters_;
   SensorCounters tally_;
   std::unique_ptr<takktile::Link> link_;  // none while the board is gone
-  std::vector<ParsedFrame> parsed_;
-  std::chrono::milliseconds back_off_ = {};
 
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> gone_ = false;

@@ -1,10 +1,14 @@
 #include "driver/usb_device.hpp"
 
 #include <algorithm>
+#include <new>
 #include <span>
 #include <utility>
 
 #include <fmt/format.h>
+
+#include "model/stream_time.hpp"
+#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -36,12 +40,15 @@ std::string help(const ListedDevice& device, int code) {
   }
 }
 
+// For the answer to a request, and for the bytes of a transfer: of a silent board, transfers end
+// and are counted.
 constexpr unsigned patience_ms = 1000;
 
-/// Returns what a libusb call returned; throws Error where the call failed.
+/// Returns what a libusb call returned. Throws Error where it failed: the message names the device,
+/// what was tried, why it failed, and the remedy.
 int checked(const ListedDevice& device, const std::string& what, int code) {
   if (code < 0) {
-    throw usb_fault(device, what, code);
+    throw Error(Fault::system, fmt::format("{}: {}: {}", device.place(), what, help(device, code)));
   }
   return code;
 }
@@ -58,10 +65,6 @@ UsbContext::UsbContext() {
                             libusb_strerror(code)));
   }
   context_.reset(context);
-}
-
-Error usb_fault(const ListedDevice& device, const std::string& what, int code) {
-  return {Fault::system, fmt::format("{}: {}: {}", device.place(), what, help(device, code))};
 }
 
 UsbHandle::UsbHandle(const UsbContext& context, ListedDevice device) : device_(std::move(device)) {
@@ -88,32 +91,6 @@ UsbHandle::~UsbHandle() {
   }
 }
 
-VendorInterface UsbHandle::vendor_interface() const {
-  libusb_config_descriptor* descriptor = nullptr;
-  checked(device_, "its configuration cannot be read",
-          libusb_get_active_config_descriptor(libusb_get_device(handle_.get()), &descriptor));
-  const std::unique_ptr<libusb_config_descriptor, void (*)(libusb_config_descriptor*)> owner(
-      descriptor, libusb_free_config_descriptor);
-  for (const libusb_interface& interface :
-       std::span(descriptor->interface, descriptor->bNumInterfaces)) {
-    // The first alternate setting is the active one.
-    for (const libusb_interface_descriptor& setting :
-         std::span(interface.altsetting, std::min(1, interface.num_altsetting))) {
-      for (const libusb_endpoint_descriptor& e :
-           std::span(setting.endpoint, setting.bNumEndpoints)) {
-        if (setting.bInterfaceClass == LIBUSB_CLASS_VENDOR_SPEC &&
-            (e.bmAttributes & LIBUSB_TRANSFER_TYPE_MASK) == LIBUSB_TRANSFER_TYPE_BULK &&
-            (e.bEndpointAddress & LIBUSB_ENDPOINT_IN) != 0) {
-          return {setting.bInterfaceNumber, e.bEndpointAddress};
-        }
-      }
-    }
-  }
-  throw Error(Fault::system,
-              fmt::format("{}: has no vendor's interface with a bulk endpoint; check its firmware",
-                          device_.place()));
-}
-
 void UsbHandle::claim(int interface) {
   checked(device_, fmt::format("interface {} cannot be claimed", interface),
           libusb_claim_interface(handle_.get(), interface));
@@ -131,9 +108,124 @@ std::vector<std::uint8_t> UsbHandle::control_in(std::uint8_t request, std::uint1
   return reply;
 }
 
-void UsbHandle::clear_halt(std::uint8_t endpoint) {
-  checked(device_, fmt::format("clearing the stall of endpoint 0x{:02X}", endpoint),
-          libusb_clear_halt(handle_.get(), endpoint));
+TransferRing::TransferRing(const UsbContext& context, UsbHandle& handle, std::uint8_t endpoint,
+                           std::size_t transfer_bytes, SensorCounters& counters)
+    : context_(context.get()),
+      handle_(handle),
+      endpoint_(endpoint),
+      transfer_bytes_(transfer_bytes),
+      slots_(transfers),
+      counters_(counters) {
+  for (Slot& slot : slots_) {
+    slot.ring = this;
+    slot.buffer.resize(transfer_bytes_);
+    slot.transfer.reset(libusb_alloc_transfer(0));
+    if (!slot.transfer) {
+      throw std::bad_alloc();
+    }
+  }
+  try {
+    begin();
+  } catch (...) {
+    drain();
+    throw;
+  }
+}
+
+TransferRing::~TransferRing() { drain(); }
+
+std::vector<TransferRing::Completion> TransferRing::completed() {
+  if (missing_ > 0) {
+    completed_.push_back({.bytes = {}, .missing = missing_});
+    missing_ = 0;
+  }
+  return std::exchange(completed_, {});
+}
+
+void TransferRing::recover() {
+  drain();
+  checked(handle_.device(), fmt::format("clearing the stall of endpoint 0x{:02X}", endpoint_),
+          libusb_clear_halt(handle_.get(), endpoint_));
+  halted_ = false;
+  begin();
+}
+
+void TransferRing::begin() {
+  for (Slot& slot : slots_) {
+    checked(handle_.device(), "no transfer can be submitted", submit(slot));
+  }
+}
+
+int TransferRing::submit(Slot& slot) {
+  libusb_fill_bulk_transfer(slot.transfer.get(), handle_.get(), endpoint_, slot.buffer.data(),
+                            static_cast<int>(slot.buffer.size()), &TransferRing::on_return, &slot,
+                            patience_ms);
+  const int code = libusb_submit_transfer(slot.transfer.get());
+  slot.under_way = code == LIBUSB_SUCCESS;
+  // Any error loses the device: no callback would submit this transfer again.
+  lost_ = lost_ || !slot.under_way;
+  return code;
+}
+
+void TransferRing::on_return(libusb_transfer* transfer) noexcept {
+  Slot& slot = *static_cast<Slot*>(transfer->user_data);
+  slot.under_way = false;
+  slot.ring->take(slot);
+}
+
+void TransferRing::take(Slot& slot) {
+  const int status = slot.transfer->status;
+  const bool damaged = status == LIBUSB_TRANSFER_ERROR || status == LIBUSB_TRANSFER_OVERFLOW;
+  // A halted endpoint stalls all submitted transfers: count one stall.
+  const bool stalled = status == LIBUSB_TRANSFER_STALL && !halted_;
+  counters_.timeouts += status == LIBUSB_TRANSFER_TIMED_OUT ? 1 : 0;
+  counters_.overflows += status == LIBUSB_TRANSFER_OVERFLOW ? 1 : 0;
+  counters_.stalls += stalled ? 1 : 0;
+  halted_ = halted_ || stalled;
+  if (damaged || stalled) {
+    ++errors_in_a_row_;
+  } else if (status == LIBUSB_TRANSFER_COMPLETED) {
+    errors_in_a_row_ = 0;
+  }
+  lost_ = lost_ || status == LIBUSB_TRANSFER_NO_DEVICE || errors_in_a_row_ >= transfers;
+
+  // A transfer that timed out or was cancelled may hold bytes.
+  const auto length = static_cast<std::size_t>(damaged ? 0 : slot.transfer->actual_length);
+  const bool ended = status == LIBUSB_TRANSFER_COMPLETED && length < transfer_bytes_;
+  missing_ += damaged ? 1 : 0;
+  if (length > 0 || ended) {
+    keep(slot, length, ended);
+  }
+  if (!draining_ && !halted_ && !lost_ && status != LIBUSB_TRANSFER_CANCELLED) {
+    submit(slot);
+  }
+}
+
+void TransferRing::keep(Slot& slot, std::size_t length, bool ended) noexcept {
+  try {
+    const auto begin = slot.buffer.begin();
+    completed_.push_back({.bytes = {begin, begin + static_cast<std::ptrdiff_t>(length)},
+                          .host_time_s = host_clock_s(),
+                          .ended = ended,
+                          .missing = missing_});
+    missing_ = 0;
+  } catch (const std::bad_alloc&) {
+    ++missing_;  // the caller is libusb, C code: no exception may leave
+  }
+}
+
+void TransferRing::drain() {
+  draining_ = true;
+  for (Slot& slot : slots_) {
+    if (slot.under_way) {
+      libusb_cancel_transfer(slot.transfer.get());
+    }
+  }
+  while (std::ranges::any_of(slots_, &Slot::under_way)) {
+    timeval patience{.tv_sec = 0, .tv_usec = 100'000};
+    libusb_handle_events_timeout_completed(context_, &patience, nullptr);
+  }
+  draining_ = false;
 }
 
 }  // namespace palpate

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "figures/axes.hpp"
+#include "figures/view.hpp"
 
 namespace palpate {
 

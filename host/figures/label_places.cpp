@@ -41,26 +41,26 @@ std::vector<Box> places_of(std::span<const PlacedLabel> labels, std::span<const 
   constexpr int directions = 16;
   constexpr double right_above = -std::numbers::pi / 4.0;
   std::vector<Box> places;
-  for (const PlacedLabel& label : labels) {
-    Box place = beside(label, nearest_px, right_above);
-    const auto free = [&](const Box& box) {
-      const Box spaced{box.left - apart_px, box.top - apart_px, box.width + 2.0 * apart_px,
-                       box.height + 2.0 * apart_px};
-      const auto covers = [&](const Box& other) { return overlap(spaced, other); };
-      return holds(room, box) && std::ranges::none_of(marks, covers) &&
-             std::ranges::none_of(places, covers);
-    };
-    bool found = false;
-    for (double off = nearest_px; off <= farthest_px && !found; off += step_px) {
-      for (int k = 0; k < directions && !found; ++k) {
+  const auto is_free = [&](const Box& box) {
+    const Box spaced{box.left - apart_px, box.top - apart_px, box.width + 2.0 * apart_px,
+                     box.height + 2.0 * apart_px};
+    const auto covers = [&](const Box& other) { return overlap(spaced, other); };
+    return holds(room, box) && std::ranges::none_of(marks, covers) &&
+           std::ranges::none_of(places, covers);
+  };
+  const auto place_of = [&](const PlacedLabel& label) {
+    for (double off = nearest_px; off <= farthest_px; off += step_px) {
+      for (int k = 0; k < directions; ++k) {
         const Box box = beside(label, off, right_above + 2.0 * std::numbers::pi * k / directions);
-        if (free(box)) {
-          place = box;
-          found = true;
+        if (is_free(box)) {
+          return box;
         }
       }
     }
-    places.push_back(place);
+    return beside(label, nearest_px, right_above);
+  };
+  for (const PlacedLabel& label : labels) {
+    places.push_back(place_of(label));
   }
   return places;
 }

@@ -5,7 +5,7 @@
 #include <glm/common.hpp>
 
 #include "figures/figures.hpp"
-#include "figures/map_layer.hpp"
+#include "figures/view.hpp"
 
 namespace palpate {
 

@@ -16,8 +16,8 @@
 #include "figures/figures.hpp"
 #include "figures/identity_panel.hpp"
 #include "figures/label_places.hpp"
-#include "figures/map_layer.hpp"
 #include "figures/outlines.hpp"
+#include "figures/view.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/pose_error.hpp"
 

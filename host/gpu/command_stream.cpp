@@ -237,12 +237,7 @@ void CommandStream::run() {
 }
 
 void CommandStream::run_recorded() {
-  try {
-    seconds_before_run_ += execute();
-  } catch (...) {
-    drop();
-    throw;
-  }
+  record([&] { seconds_before_run_ += execute(); });
   for (const Download& download : downloads_) {
     std::memcpy(download.target, download.source, download.bytes);
   }
@@ -253,30 +248,27 @@ void CommandStream::run_recorded() {
 double CommandStream::execute() {
   const VkDevice device = context_.device();
   const VkFence fence = fence_.get();
-  const auto require = [this](VkResult result) {
-    if (result != VK_SUCCESS) {  // no message is made while all goes well
-      check(result, fmt::format("running on device '{}'", context_.name()));
-    }
-  };
+  const auto doing = fmt::format("running on device '{}'", context_.name());
   barrier_to_host(commands_);
   if (timestamps_) {
     vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_.get(), 1);
   }
-  require(vkEndCommandBuffer(commands_));
-  require(vkResetFences(device, 1, &fence));
+  check(vkEndCommandBuffer(commands_), doing);
+  check(vkResetFences(device, 1, &fence), doing);
   const VkSubmitInfo submit{.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
                             .commandBufferCount = 1,
                             .pCommandBuffers = &commands_};
   const auto start = std::chrono::steady_clock::now();
-  require(context_.submit(submit, fence));
-  require(vkWaitForFences(device, 1, &fence, VK_TRUE, std::numeric_limits<std::uint64_t>::max()));
+  check(context_.submit(submit, fence), doing);
+  check(vkWaitForFences(device, 1, &fence, VK_TRUE, std::numeric_limits<std::uint64_t>::max()),
+        doing);
   if (!timestamps_) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
   std::array<std::uint64_t, 2> ticks{};
-  require(vkGetQueryPoolResults(device, timestamps_.get(), 0, 2, sizeof ticks, ticks.data(),
-                                sizeof ticks[0],
-                                VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
+  check(vkGetQueryPoolResults(device, timestamps_.get(), 0, 2, sizeof ticks, ticks.data(),
+                              sizeof ticks[0], VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
+        doing);
   return static_cast<double>((ticks[1] - ticks[0]) & context_.limits().timestamp_mask) *
          context_.limits().timestamp_ns * 1e-9;
 }

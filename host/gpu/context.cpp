@@ -51,15 +51,15 @@ Function instance_function(VkInstance instance, const char* name) {
 
 void ValidationLog::add(std::string message) {
   const std::scoped_lock lock(mutex_);
-  messages_.push_back(std::move(message));
+  if (first_.empty()) {
+    first_ = std::move(message);
+  }
 }
 
 void ValidationLog::throw_if_any() {
   const std::scoped_lock lock(mutex_);
-  if (!messages_.empty()) {
-    const std::string first = messages_.front();
-    messages_.clear();
-    throw Error(Fault::system, "Vulkan validation: " + first);
+  if (!first_.empty()) {
+    throw Error(Fault::system, "Vulkan validation: " + std::exchange(first_, {}));
   }
 }
 
@@ -203,24 +203,6 @@ void Context::inspect() {
   }
   vkGetPhysicalDeviceMemoryProperties(physical_, &memory_);
   limits_.memory = device_memory(memory_);
-}
-
-void Context::lower_limits(const Limits& limits) {
-  inspect();
-  const Limits own = limits_;
-  limits_ = limits;
-  const auto at_most = [](auto& limit, auto bound) { limit = std::min(limit, bound); };
-  at_most(limits_.group_invocations, own.group_invocations);
-  for (std::size_t i = 0; i < 3; ++i) {
-    at_most(limits_.group_size[i], own.group_size[i]);
-    at_most(limits_.group_count[i], own.group_count[i]);
-  }
-  at_most(limits_.shared_bytes, own.shared_bytes);
-  at_most(limits_.storage_range, own.storage_range);
-  at_most(limits_.allocation, own.allocation);
-  at_most(limits_.table_texels, own.table_texels);
-  at_most(limits_.memory, own.memory);
-  at_most(limits_.push_bytes, own.push_bytes);
 }
 
 Context::~Context() {

@@ -5,7 +5,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include <vulkan/vulkan_core.h>
 
@@ -16,16 +15,16 @@
 
 namespace palpate::gpu {
 
-/// Collects the messages of Vulkan's validation layer.
+/// Keeps the first message of Vulkan's validation layer.
 class ValidationLog {
  public:
   void add(std::string message);
-  /// @throws Error with the first message, if there is any
+  /// @throws Error with the message, if there is any
   void throw_if_any();
 
  private:
   std::mutex mutex_;
-  std::vector<std::string> messages_;
+  std::string first_;
 };
 
 /// Counts as a use of Vulkan while it lives. Drivers keep threads, for which even the end of a
@@ -108,9 +107,9 @@ class Context {
   const Limits& limits() const { return limits_; }
   /// Stays empty on a device that was handed in: the program gets the messages of its instance.
   ValidationLog& validation() { return instance_ ? instance_->validation() : no_messages_; }
-  /// Lowers the device's own limits to these, where they are lower. Only tests do so: on any device
-  /// they reach the cases of much smaller devices and much larger problems.
-  void lower_limits(const Limits& limits);
+  /// Replaces the device's limits by lower ones. Only tests do so: on any device they reach the
+  /// cases of much smaller devices and much larger problems.
+  void lower_limits(const Limits& limits) { limits_ = limits; }
 
   /// What buffers take, and took at most.
   MemoryUse memory_use() const;

@@ -1,9 +1,11 @@
 #include "gpu/selection.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cstdlib>
+#include <cstring>
+#include <iterator>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -16,25 +18,13 @@ namespace palpate::gpu {
 
 namespace {
 
-struct TypeName {
-  const char* name;
-  int rank;
-};
-
-TypeName type_of(VkPhysicalDeviceType type) {
-  switch (type) {
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
-      return {"discrete", 0};
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
-      return {"integrated", 1};
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
-      return {"virtual", 2};
-    case VK_PHYSICAL_DEVICE_TYPE_CPU:
-      return {"CPU", 3};
-    default:
-      return {"other", 4};
-  }
-}
+/// Types of devices, the best first, and last any other.
+constexpr std::pair<VkPhysicalDeviceType, const char*> types[] = {
+    {VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU, "discrete"},
+    {VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU, "integrated"},
+    {VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU, "virtual"},
+    {VK_PHYSICAL_DEVICE_TYPE_CPU, "CPU"},
+    {VK_PHYSICAL_DEVICE_TYPE_OTHER, "other"}};
 
 std::string version_text(std::uint32_t version) {
   return fmt::format("{}.{}.{}", VK_API_VERSION_MAJOR(version), VK_API_VERSION_MINOR(version),
@@ -74,12 +64,15 @@ Candidate inspect(VkPhysicalDevice physical, int index) {
   VkPhysicalDeviceMemoryProperties memory;
   vkGetPhysicalDeviceMemoryProperties(physical, &memory);
 
-  const TypeName type = type_of(properties.deviceType);
-  Candidate candidate{.physical = physical, .rank = type.rank, .info = {}};
+  // Any other type is the last one.
+  const auto* type = std::find_if(types, std::end(types) - 1, [&](const auto& candidate) {
+    return candidate.first == properties.deviceType;
+  });
+  Candidate candidate{.physical = physical, .rank = static_cast<int>(type - types), .info = {}};
   DeviceInfo& info = candidate.info;
   info.index = index;
   info.name = properties.deviceName;
-  info.type = type.name;
+  info.type = type->second;
   info.driver = fmt::format("{} {}", driver.driverName, driver.driverInfo);
   info.api = version_text(properties.apiVersion);
   info.memory_gib = static_cast<double>(device_memory(memory)) / (1 << 30);
@@ -96,18 +89,11 @@ Candidate inspect(VkPhysicalDevice physical, int index) {
   return candidate;
 }
 
-std::string lower(std::string_view text) {
-  std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return result;
-}
-
 bool matches(const DeviceInfo& info, std::string_view name_or_index) {
   if (const auto index = whole_number_of(name_or_index)) {
     return info.index == *index;
   }
-  return lower(info.name).find(lower(name_or_index)) != std::string::npos;
+  return strcasestr(info.name.c_str(), std::string(name_or_index).c_str()) != nullptr;
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "learning/map_request.hpp"
+#include "learning/map_task.hpp"
 
 #include <algorithm>
 #include <charconv>

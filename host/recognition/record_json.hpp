@@ -9,12 +9,11 @@
 #include "palpate/touch.hpp"
 #include "recognition/evaluation.hpp"
 #include "recognition/judged_results.hpp"
+#include "recognition/live_recognition.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/touch_plan.hpp"
 
 namespace palpate {
-
-struct LiveTouch;
 
 /// "fits", "doubtful" or "does not fit".
 std::string verdict_text(Verdict verdict);

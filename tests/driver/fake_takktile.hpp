@@ -131,8 +131,6 @@ class FakeTakktile {
         streaming_ = (setup.index & clock_by_256) == clock_by_256;
         return Bytes{static_cast<std::uint8_t>(setup.index != 0 ? 1 : 0)};
       }
-      case 0xba:
-        return Bytes{1};
       default:
         return std::nullopt;
     }

@@ -1,5 +1,5 @@
 #include "driver/takktile_protocol.hpp"
-#include "driver/transfer_ring.hpp"
+#include "driver/usb_device.hpp"
 #include "fake_takktile.hpp"
 #include "palpate/driver.hpp"
 #include "streamed.hpp"
@@ -171,25 +171,6 @@ TEST_F(TransferFault, FramesOfAnotherLengthAreCountedAndPassedOver) {
   sensor_->stop();
   EXPECT_EQ(sensor_->counters().lost, 3U);
   EXPECT_EQ(sensor_->counters().garbage_bytes, 76U + 160U + 320U);
-}
-
-TEST_F(TransferFault, TheOldestFramesGoWhereNobodyTakesThem) {
-  constexpr int sent = 1100;
-  constexpr int kept = 1024;
-  for (int i = 0; i < sent; ++i) {
-    board_.send_frame(i % 1000);
-  }
-  ASSERT_TRUE(becomes_true([&] {
-    const SensorCounters counters = sensor_->counters();
-    return counters.frames + counters.lost == sent;
-  }));
-  EXPECT_EQ(sensor_->counters().lost, static_cast<std::uint64_t>(sent - kept));
-  const std::vector<Frame> frames = take(*sensor_, kept);
-  ASSERT_EQ(frames.size(), static_cast<std::size_t>(kept));
-  EXPECT_EQ(frames[0].lost_before, static_cast<std::uint64_t>(sent - kept));
-  EXPECT_NEAR(frames[0].values[0], expected_kpa(sent - kept), kpa_tolerance);
-  EXPECT_EQ(frames[1].lost_before, 0U);
-  EXPECT_NEAR(frames.back().values[0], expected_kpa((sent - 1) % 1000), kpa_tolerance);
 }
 
 }  // namespace palpate::takktile_test

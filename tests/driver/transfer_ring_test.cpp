@@ -1,12 +1,10 @@
-#include "driver/transfer_ring.hpp"
-
 #include <gtest/gtest.h>
 
 #include <future>
 #include <optional>
 #include <stdexcept>
 
-#include "driver/frame_queue.hpp"
+#include "driver/queued_sensor.hpp"
 #include "driver/usb_device.hpp"
 #include "fake_takktile.hpp"
 #include "palpate/error.hpp"
@@ -44,7 +42,7 @@ class Ring : public testing::Test {
   FakeTakktile board_{usb_, "1", {0b11111}};
   UsbContext context_;
   UsbHandle handle_{context_, usb_devices().at(0)};
-  TransferRing::Counters counters_;
+  SensorCounters counters_;
   std::optional<TransferRing> ring_;
 };
 
@@ -66,7 +64,6 @@ TEST_F(Ring, TellsWhichTransferAPacketEnded) {
 TEST_F(Ring, CountsWhatItHasNoMemoryToKeep) {
   board_.usb().send(Bytes(1, 1));
   ASSERT_TRUE(pump());
-  // More transfers than the ring keeps spare buffers for.
   constexpr std::uint64_t lost = 2 * TransferRing::transfers;
   for (std::uint64_t i = 0; i < lost; ++i) {
     board_.usb().send(Bytes(2, 2));
@@ -81,22 +78,6 @@ TEST_F(Ring, CountsWhatItHasNoMemoryToKeep) {
   EXPECT_EQ(completions[1].bytes, Bytes(3, 3));
   EXPECT_EQ(completions[1].missing, lost);
   EXPECT_FALSE(ring_->lost());
-}
-
-TEST_F(Ring, NeedsNoMemoryForAsMuchAsWasRecycled) {
-  for (int round = 0; round < 4; ++round) {
-    for (const std::uint8_t i : {0, 1, 2, 3, 4}) {
-      board_.usb().send(Bytes(1, i));
-    }
-    ASSERT_TRUE(pump(/*has_memory=*/round == 0));
-    std::vector<Completion> completions = ring_->completed();
-    ASSERT_EQ(completions.size(), 5U) << round;
-    for (const std::uint8_t i : {0, 1, 2, 3, 4}) {
-      EXPECT_EQ(completions[i].bytes, Bytes(1, i));
-      EXPECT_EQ(completions[i].missing, 0U);
-    }
-    ring_->recycle(std::move(completions));
-  }
 }
 
 TEST_F(Ring, EndsWithoutMemory) {
@@ -123,48 +104,58 @@ TEST_F(Ring, OfADeviceThatIsGoneDoesNotBegin) {
 
 using std::chrono::milliseconds;
 
-Frame numbered(double number, std::uint64_t lost_before = 0) {
-  return {.values = {number}, .lost_before = lost_before};
-}
+/// A sensor whose thread is the test's.
+struct OpenSensor : QueuedSensor {
+  void start() override { forget(); }
+  void stop() override {}
+  void send(double number) { push({.values = {number}}, 0.0); }
+  std::optional<Frame> take() { return next(milliseconds(0)); }
+  using QueuedSensor::fail;
+  using QueuedSensor::lose;
+};
 
-TEST(FrameQueueTest, TellsWithTheNextFrameWhatWasDropped) {
-  FrameQueue queue;
+TEST(QueuedSensorTest, TellsWithTheNextFrameWhatWasDropped) {
+  OpenSensor sensor;
   constexpr int more = 3;
-  queue.push(numbered(-1, 5));
-  for (int i = 0; i < static_cast<int>(FrameQueue::capacity) + more - 1; ++i) {
-    queue.push(numbered(i));
+  sensor.lose(5);
+  for (int i = 0; i < static_cast<int>(QueuedSensor::capacity) + more; ++i) {
+    sensor.send(i);
   }
-  EXPECT_EQ(queue.counters().pushed, FrameQueue::capacity + more);
-  EXPECT_EQ(queue.counters().dropped, static_cast<std::uint64_t>(more));
-  const std::optional<Frame> first = queue.pop(milliseconds(0));
+  EXPECT_EQ(sensor.counters().frames, QueuedSensor::capacity);
+  EXPECT_EQ(sensor.counters().lost, static_cast<std::uint64_t>(more));
+  const std::optional<Frame> first = sensor.take();
   ASSERT_TRUE(first);
-  EXPECT_EQ(first->values, std::vector<double>{more - 1});
+  EXPECT_EQ(first->values, std::vector<double>{more});
   EXPECT_EQ(first->lost_before, 5U + more) << "with those lost before the dropped ones";
-  EXPECT_EQ(queue.pop(milliseconds(0))->lost_before, 0U);
+  EXPECT_EQ(sensor.take()->lost_before, 0U);
 }
 
-TEST(FrameQueueTest, SaysWhyNoFrameComesOnceNoneIsLeft) {
-  FrameQueue queue;
-  queue.push(numbered(1));
-  queue.fail(std::make_exception_ptr(std::runtime_error("gone")));
-  EXPECT_TRUE(queue.pop(milliseconds(0)));
-  for (int i = 0; i < 2; ++i) {
-    EXPECT_THROW(queue.pop(milliseconds(0)), std::runtime_error);
+TEST(QueuedSensorTest, SaysWhyNoFrameComesOnceNoneIsLeft) {
+  OpenSensor sensor;
+  sensor.send(1);
+  try {
+    throw std::runtime_error("gone");
+  } catch (...) {
+    sensor.fail();
   }
-  queue.clear();
-  EXPECT_EQ(queue.pop(milliseconds(0)), std::nullopt);
-  EXPECT_EQ(queue.counters().pushed, 0U);
+  EXPECT_TRUE(sensor.take());
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_THROW(sensor.take(), std::runtime_error);
+  }
+  sensor.start();
+  EXPECT_EQ(sensor.take(), std::nullopt);
+  EXPECT_EQ(sensor.counters().frames, 0U);
 }
 
-TEST(FrameQueueTest, WaitsAsLongAsATimeCanBe) {
-  FrameQueue queue;
-  auto frame = std::async(std::launch::async, [&] { return queue.pop(milliseconds::max()); });
-  // If the end of the wait overflowed into the past, pop() would have returned by now.
+TEST(QueuedSensorTest, WaitsAsLongAsATimeCanBe) {
+  OpenSensor sensor;
+  auto frame = std::async(std::launch::async, [&] { return sensor.next(milliseconds::max()); });
+  // If the end of the wait overflowed into the past, next() would have returned by now.
   EXPECT_EQ(frame.wait_for(milliseconds(50)), std::future_status::timeout);
-  queue.push(numbered(1));
+  sensor.send(1);
   ASSERT_EQ(frame.wait_for(patience), std::future_status::ready);
   EXPECT_TRUE(frame.get());
-  EXPECT_EQ(queue.pop(milliseconds::min()), std::nullopt);
+  EXPECT_EQ(sensor.next(milliseconds::min()), std::nullopt);
 }
 
 }  // namespace palpate::transfer_ring_test

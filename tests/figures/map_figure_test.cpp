@@ -4,9 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "figures/evidence_scale.hpp"
 #include "figures/figures.hpp"
-#include "figures/map_layer.hpp"
+#include "figures/view.hpp"
 #include "picture.hpp"
 #include "support/errors.hpp"
 #include "support/limits.hpp"

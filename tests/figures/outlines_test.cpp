@@ -74,20 +74,6 @@ TEST(Footprint, LiesAlongTheSmallestRectangle) {
   }
 }
 
-// With every corner against every edge these would take minutes.
-TEST(Footprint, OfALargeArrayIsMadeAtOnce) {
-  constexpr std::size_t elements = 40'000;
-  std::vector<glm::dvec2> ring;
-  for (std::size_t k = 0; k < elements; ++k) {
-    ring.push_back(rotate(2.0 * std::numbers::pi * static_cast<double>(k) / elements, {50.0, 0.0}));
-  }
-  const Footprint round = footprint(ring, 0.01);
-  EXPECT_EQ(round.elements.size(), elements);
-  // The ring, and up to half a diagonal of an element around it.
-  EXPECT_GT(area(round.outline), std::numbers::pi * 50.0 * 50.0);
-  EXPECT_LT(area(round.outline), std::numbers::pi * 50.01 * 50.01);
-}
-
 TEST(Footprint, OfOneElementOfARowAndOfNone) {
   const Footprint one = footprint(std::vector<glm::dvec2>{{2.0, 3.0}}, 1.8);
   ASSERT_EQ(one.elements.size(), 1u);

@@ -2,46 +2,26 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <memory>
-#include <string_view>
 
-#include <cairo.h>
 #include <gtest/gtest.h>
+#include <png.h>
 
 namespace palpate {
 
 Picture decode(const std::string& png) {
-  std::string_view left = png;
-  const auto take = [](void* rest, unsigned char* data, unsigned int size) {
-    auto& bytes = *static_cast<std::string_view*>(rest);
-    if (bytes.size() < size) {
-      return CAIRO_STATUS_READ_ERROR;
-    }
-    std::memcpy(data, bytes.data(), size);
-    bytes.remove_prefix(size);
-    return CAIRO_STATUS_SUCCESS;
-  };
-  const std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)> surface(
-      cairo_image_surface_create_from_png_stream(take, &left), cairo_surface_destroy);
-  EXPECT_EQ(cairo_surface_status(surface.get()), CAIRO_STATUS_SUCCESS);
-  EXPECT_TRUE(left.empty()) << left.size() << " bytes after the picture";
-  if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  if (png_image_begin_read_from_memory(&image, png.data(), png.size()) == 0) {
+    ADD_FAILURE() << image.message;
     return {};
   }
-
-  Picture picture{.width = cairo_image_surface_get_width(surface.get()),
-                  .height = cairo_image_surface_get_height(surface.get()),
-                  .pixels = {}};
-  const unsigned char* data = cairo_image_surface_get_data(surface.get());
-  const int stride = cairo_image_surface_get_stride(surface.get());
-  for (int y = 0; y < picture.height; ++y) {
-    for (int x = 0; x < picture.width; ++x) {
-      std::uint32_t pixel = 0;
-      std::memcpy(&pixel, data + static_cast<std::ptrdiff_t>(y) * stride + 4 * x, sizeof pixel);
-      picture.pixels.push_back(pixel & 0xFFFFFF);
-    }
-  }
+  image.format = PNG_FORMAT_BGRA;  // words of 0xAARRGGBB
+  Picture picture{.width = static_cast<int>(image.width),
+                  .height = static_cast<int>(image.height),
+                  .pixels = std::vector<std::uint32_t>(image.width * image.height)};
+  EXPECT_NE(png_image_finish_read(&image, nullptr, picture.pixels.data(), 0, nullptr), 0)
+      << image.message;
+  std::ranges::for_each(picture.pixels, [](std::uint32_t& pixel) { pixel &= 0xFFFFFF; });
   return picture;
 }
 

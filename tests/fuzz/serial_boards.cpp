@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "driver/deframer.hpp"
 #include "driver/serial_profile.hpp"
 #include "palpate/error.hpp"
 
@@ -46,15 +47,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
   }
   const std::size_t piece = (rest.empty() ? 0 : rest[0]) + std::size_t{1};
-  const auto deframer = palpate::make_deframer(profile);
-  std::vector<palpate::ParsedFrame> frames;
+  palpate::PacketDeframer deframer(profile.packet);
+  std::vector<palpate::Frame> frames;
   for (; !rest.empty(); rest = rest.subspan(std::min(piece, rest.size()))) {
-    deframer->push(rest.first(std::min(piece, rest.size())), frames);
+    deframer.push(rest.first(std::min(piece, rest.size())), frames);
   }
-  for (const palpate::ParsedFrame& frame : frames) {
+  for (const palpate::Frame& frame : frames) {
     expect(frame.values.size() == profile.elements_mm.size());
     expect(std::ranges::none_of(frame.values, [](double value) { return std::isinf(value); }));
   }
-  expect(deframer->counters().garbage_bytes <= size);
+  expect(deframer.counters().garbage_bytes <= size);
   return 0;
 }

@@ -18,18 +18,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     calibration = palpate::takktile::parse_calibration(input.first(std::min<std::size_t>(size, 8)));
   } catch (const palpate::Error&) {
   }
+  std::uint64_t garbage_bytes = 0;
   palpate::takktile::Deframer deframer(
-      std::vector<palpate::takktile::Calibration>(cells, calibration));
-  std::vector<palpate::ParsedFrame> frames;
+      std::vector<palpate::takktile::Calibration>(cells, calibration), garbage_bytes);
   for (std::span<const std::uint8_t> rest = input; !rest.empty();) {
     const std::size_t bytes = std::min<std::size_t>(rest[0] % 80, rest.size() - 1);
-    deframer.push(rest.subspan(1, bytes), frames);
-    rest = rest.subspan(1 + bytes);
-  }
-  for (const palpate::ParsedFrame& frame : frames) {
-    if (frame.values.size() != cells) {
+    const auto frame =
+        deframer.push(rest.subspan(1, bytes), bytes < palpate::takktile::packet_bytes);
+    if ((frame && frame->values.size() != cells) || garbage_bytes > size) {
       std::abort();
     }
+    rest = rest.subspan(1 + bytes);
   }
   return 0;
 }

@@ -136,7 +136,6 @@ SOUND: Files = {
 }
 #: Files, flags, and what the line says.
 REFUSED: dict[str, tuple["Files | str | bytes", list[str], str]] = {
-    "text": ("time,p0,p1\n0,1,2\n1,3,abc\n", [], "log.csv:3: column 'p1': 'abc' is not a finite number"),
     "no_time": ("time,p0,p1\n,1,2\n", [], "log.csv:2: column 'time' is empty"),
     "nanoseconds": ("time,p0,p1\n1700000000000000000,1,2\n", [], "log.csv:2: column 'time': 1.7e+18 s is no time"),
     "two_units": ("time_ns,p0,p1\n1,1,2\n", ["--time-unit", "s"],
@@ -162,7 +161,6 @@ REFUSED: dict[str, tuple["Files | str | bytes", list[str], str]] = {
     "a_temperature_is_no_time": ("T,p0,p1\n20,1,2\n", ["--pressure-columns", "p"], "log.csv: its rows are touches"),
     "touches_without_their_poses": ("x,y,theta,p0,p1\n0,0,0,1,2\n", [], "log.csv: its rows are touches"),
     "a_bad_cell_in_the_first_row": ("0,1,NA\n1,2,3\n", [], "log.csv:1: column '3': 'NA' is not a finite number"),
-    "ragged": ("time,p0,p1\n0,1,2\n1,3\n", [], "log.csv:3: the row has 2 cells, the first row 3"),
     "header_alone": ("time,p0,p1\n", [], "log.csv: holds a header and no row"),
     "nothing_read": ("time,p0,p1\n0,,\n", [], "log.csv: holds no reading of a living element"),
     "no_such_element": ("time,element,pressure\n0,2,1\n", [], "log.csv:2: column 'element': 2 is no element"),
@@ -198,7 +196,6 @@ REFUSED: dict[str, tuple["Files | str | bytes", list[str], str]] = {
     "a_rotation_vector_of_a_tool_that_points_down": ({"poses.csv": "time,x,y,z,rx,ry,rz\n0,0,0,5,2.2,2.2,0\n"},
         [*WITH_POSES, "--pose-columns", "x,y,rz"],
         "poses.csv:2: column 'rx': the array is turned by 126 degrees out of the xy plane"),
-    "binary": (b"\0\1\2", [], "log.csv: is no text"),
     "no_rotation_by_row": (poses(",".join(f"t{i}" for i in range(12)), MATRIX_ROWS[0], "1,0,0,0,0,2,0,0,0,0,1,0"),
         [*WITH_POSES, "--pose-columns", "t*"],
         "poses.csv:3: the numbers are no rotation and position, read by rows; correct them, or give --matrix columns"),

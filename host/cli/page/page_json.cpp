@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "figures/evidence_scale.hpp"
+#include "figures/palette.hpp"
 
 namespace palpate::cli {
 
@@ -47,7 +47,7 @@ nlohmann::ordered_json map_json(const OccupancyGrid& map) {
     const double part = (log_odds - map.prior_log_odds()) / nats;
     evidence.push_back(byte(128.0 + 127.0 * std::clamp(part, -1.0, 1.0)));
   }
-  const glm::dvec2 lower_mm = lower_edge_mm(map);
+  const glm::dvec2 lower_mm = map.origin_mm - 0.5 * map.cell_mm;
   return {{"label", map.label},     {"lower_mm", {lower_mm.x, lower_mm.y}},
           {"cell_mm", map.cell_mm}, {"nx", map.nx},
           {"ny", map.ny},           {"nats", nats},

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
+#include "driver/deframer.hpp"
 #include "driver/serial_profile.hpp"
 #include "sent_frame.hpp"
 
@@ -16,9 +16,9 @@ namespace palpate {
 /// Pushes streams through one deframer and compares the decoded frames with the sent frames.
 class Receiver {
  public:
-  explicit Receiver(const SerialProfile& profile) : deframer_(make_deframer(profile)) {}
+  explicit Receiver(const SerialProfile& profile) : deframer_(profile.packet) {}
 
-  void push(std::span<const std::uint8_t> bytes) { deframer_->push(bytes, frames_); }
+  void push(std::span<const std::uint8_t> bytes) { deframer_.push(bytes, frames_); }
   void send(const std::vector<SentFrame>& sent) { push(stream_of(sent)); }
   /// Pushes pieces of as many bytes as `size` says, as transfers deliver them.
   template <class Size>
@@ -34,7 +34,7 @@ class Receiver {
   bool has(const std::vector<SentFrame>& sent, std::size_t begin, std::size_t end) const {
     auto at = frames_.begin();
     for (std::size_t i = begin; i < end; ++i) {
-      at = std::ranges::find(at, frames_.end(), sent[i].values, &ParsedFrame::values);
+      at = std::ranges::find(at, frames_.end(), sent[i].values, &Frame::values);
       if (at == frames_.end()) {
         return false;
       }
@@ -50,20 +50,19 @@ class Receiver {
 
   /// Number of frames that were not sent.
   auto strangers(const std::vector<SentFrame>& sent) const {
-    return std::ranges::count_if(frames_, [&](const ParsedFrame& frame) {
+    return std::ranges::count_if(frames_, [&](const Frame& frame) {
       return std::ranges::find(sent, frame.values, &SentFrame::values) == sent.end();
     });
   }
 
   void clear() { frames_.clear(); }
-  void reset() { deframer_->reset(); }
-  const std::vector<ParsedFrame>& frames() const { return frames_; }
-  std::uint64_t garbage() const { return deframer_->counters().garbage_bytes; }
-  std::uint64_t checksum_errors() const { return deframer_->counters().checksum_errors; }
+  const std::vector<Frame>& frames() const { return frames_; }
+  std::uint64_t garbage() const { return deframer_.counters().garbage_bytes; }
+  std::uint64_t checksum_errors() const { return deframer_.counters().checksum_errors; }
 
  private:
-  std::unique_ptr<Deframer> deframer_;
-  std::vector<ParsedFrame> frames_;
+  PacketDeframer deframer_;
+  std::vector<Frame> frames_;
 };
 
 }  // namespace palpate

@@ -5,8 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "driver/deframer.hpp"
-
 namespace palpate {
 
 using Bytes = std::vector<std::uint8_t>;

@@ -105,10 +105,11 @@ class TakkTileFrames : public testing::TestWithParam<std::size_t> {
  protected:
   void push(const std::vector<Bytes>& packets) {
     for (const Bytes& packet : packets) {
-      const std::size_t before = frames_.size();
-      deframer_.push(packet, frames_);
       pushed_bytes_ += packet.size();
-      framed_bytes_ += (frames_.size() - before) * 4 * cells_;
+      if (auto frame = deframer_.push(packet, packet.size() < packet_bytes)) {
+        frames_.push_back(std::move(*frame));
+        framed_bytes_ += 4 * cells_;
+      }
     }
   }
   void expect_frame(std::size_t index, std::uint16_t first) {
@@ -122,8 +123,9 @@ class TakkTileFrames : public testing::TestWithParam<std::size_t> {
   }
 
   const std::size_t cells_ = GetParam();
-  Deframer deframer_{std::vector<Calibration>(cells_, plain)};
-  std::vector<ParsedFrame> frames_;
+  std::uint64_t garbage_bytes_ = 0;
+  Deframer deframer_{std::vector<Calibration>(cells_, plain), garbage_bytes_};
+  std::vector<Frame> frames_;
   std::uint64_t pushed_bytes_ = 0;
   std::uint64_t framed_bytes_ = 0;
 };
@@ -136,7 +138,7 @@ TEST_P(TakkTileFrames, EndWithAShortOrAnEmptyPacket) {
   ASSERT_EQ(frames_.size(), 2u);
   expect_frame(0, 100);
   expect_frame(1, 1000);
-  EXPECT_EQ(deframer_.counters().garbage_bytes, 0u);
+  EXPECT_EQ(garbage_bytes_, 0u);
 }
 
 TEST_P(TakkTileFrames, ThatLoseAPacketAreDropped) {
@@ -165,17 +167,16 @@ TEST_P(TakkTileFrames, AreNeverHalfBehindForeignPackets) {
     }
     push(packets_of(cells_, 50));
     push(packets_of(cells_, 55));
-    for (const ParsedFrame& frame : frames_) {
+    for (const Frame& frame : frames_) {
       ASSERT_EQ(frame.values.size(), cells_);
     }
     frames_.clear();
     push(packets_of(cells_, 60));
     ASSERT_EQ(frames_.size(), 1u);
     expect_frame(0, 60);
-    ASSERT_EQ(deframer_.counters().garbage_bytes + framed_bytes_, pushed_bytes_);
+    ASSERT_EQ(garbage_bytes_ + framed_bytes_, pushed_bytes_);
     frames_.clear();
   }
-  EXPECT_EQ(deframer_.counters().checksum_errors, 0u);
 }
 
 TEST_P(TakkTileFrames, BeginAnewAfterReset) {

@@ -9,6 +9,9 @@
 #include <glm/vec2.hpp>
 
 #include "figures/canvas.hpp"
+#include "figures/palette.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "palpate/pose.hpp"
 
 namespace palpate {
 
@@ -54,5 +57,21 @@ void draw_axes(Canvas& canvas, const View& view, const std::vector<Tick>& x_tick
 void draw_colour_bar(Canvas& canvas, const Box& box, double lower, double upper,
                      const std::function<Colour(double value)>& colour,
                      const std::vector<Tick>& ticks, std::string_view caption);
+
+/// Returns a corner of the area that the map's cells cover, in mm in the object frame.
+glm::dvec2 lower_edge_mm(const OccupancyGrid& map);
+glm::dvec2 upper_edge_mm(const OccupancyGrid& map);
+
+/// Draws the map in a view of its own frame.
+void draw_cells(Canvas& canvas, const View& view, const OccupancyGrid& map,
+                const EvidenceScale& scale);
+
+/// Draws the map in a view of another frame; white beyond it.
+void draw_cells(Canvas& canvas, const View& view, const OccupancyGrid& map,
+                const EvidenceScale& scale, const Pose& T_map_view);
+
+/// Draws the scale's colour bar, with words for its ends above. It takes 26 pixels above the box
+/// and 56 below it.
+void draw_evidence_bar(Canvas& canvas, const Box& box, const EvidenceScale& scale);
 
 }  // namespace palpate

@@ -1,13 +1,13 @@
 // Axes, and where labels find room.
 
-#include "figures/axes.hpp"
+#include "figures/view.hpp"
 
 #include <gtest/gtest.h>
 
 #include "figures/label_places.hpp"
 #include "picture.hpp"
 
-namespace palpate::axes_test {
+namespace palpate::view_test {
 
 std::vector<std::string> labels(const std::vector<Tick>& ticks) {
   std::vector<std::string> result;
@@ -102,4 +102,4 @@ TEST(LabelPlaces, LieRightAboveUnlessTheRoomEndsThereOrIsTooSmall) {
   EXPECT_LT(place_in({40.0, 40.0, 40.0, 40.0}).bottom(), 50.0);
 }
 
-}  // namespace palpate::axes_test
+}  // namespace palpate::view_test
