@@ -24,9 +24,6 @@ LatticePlace place_of(const RefinedPose& refined, const PoseLattice& lattice);
 /// Variances of that place.
 LatticePlace variances_of(const RefinedPose& refined, const PoseLattice& lattice);
 
-/// Root mean square distance of the body from its centroid, mm: how far a turn by 1 rad moves it.
-double spin_mm(const Body& body);
-
 /// An object's belief in cells of some bins each, about a millimetre wide by how far they move the
 /// object, and the peaks that the cells belong to.
 class BeliefCells {
