@@ -336,7 +336,7 @@ TEST(NearbyFit, IsAsGoodAsThatOfTheTruePoseHalfAStepAway) {
     const Pose start{truth.translation_mm + off_mm, truth.theta_rad + 0.05};
     EXPECT_LT(fit_of(touches, start, map, contact)->z, at_truth - 1.0);
     // The best pose of these touches fits a little better than the true one.
-    EXPECT_GT(best_fit_near(evidence_of(touches, contact), start, map, contact)->z, at_truth);
+    EXPECT_GT(best_fit_near(evidence_of(touches, contact), start, map, contact, 0)->z, at_truth);
   }
 }
 
