@@ -1,4 +1,4 @@
-#include "palpate/scene.hpp"
+#include "palpate/files.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,10 +9,10 @@
 
 #include "learning/press_placement.hpp"
 #include "model/bounding_box.hpp"
-#include "model/contact_readings.hpp"
-#include "model/interpolated_map.hpp"
+#include "model/map_likelihood.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
-#include "palpate/reading_layer.hpp"
+#include "palpate/learned_sensor.hpp"
 #include "simulated_presses.hpp"
 #include "support/errors.hpp"
 #include "support/synthetic.hpp"

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include "palpate/baseline.hpp"
+#include "palpate/sensor.hpp"
 #include "press.hpp"
 #include "support/errors.hpp"
 #include "support/limits.hpp"

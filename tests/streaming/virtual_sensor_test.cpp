@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <numbers>
 
-#include "palpate/baseline.hpp"
 #include "palpate/files.hpp"
+#include "palpate/sensor.hpp"
 #include "palpate/simulation.hpp"
 #include "press.hpp"
 #include "support/limits.hpp"
