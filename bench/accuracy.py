@@ -13,17 +13,11 @@ import palpate
 from palpate._statistics import present, quantile
 from palpate._tables import Column, Table, column, number, plain
 
-from .measures import (
-    bootstrap_record,
-    level_in_modes,
-    normalised_error,
-    share_record,
-    told_apart,
-    with_interval,
-)
+from .measures import bootstrap_record, level_in_modes, normalised_error, share_record, told_apart
+from .measures import with_interval
 from .program import Json, at_least_1, begin, main, parser, run_palpate, write
-from .scenarios import PLANNED, SCENARIOS, Scenario, learned_touches, slipping, trials_of
-from .trials import VOWELS, Bins, Body, Floats, lattice_of, letter_maps, truth_of
+from .scenarios import PLANNED, SCENARIOS, Scenario, slipping, trials_of
+from .trials import VOWELS, Bins, Body, Floats, lattice_of, letter_maps, training_recordings, truth_of
 
 WALK_SEED = 850_000_000
 SET_SEEDS = 10**10  # between the unknowns of two training sets
@@ -196,38 +190,38 @@ def row_of(
         return quantile(of, 0.5) if len(of) else None
 
     refined, first_mm = values(known, "refined_mm"), values(first, "refined_mm")
+    levels, acts = values(known, "level"), values(known, "act")
+    refined_there, nees, z = (present(values(known, name)) for name in ("refined_mm", "nees", "z"))
     both = ~numpy.isnan(refined + first_mm)
-    levels, acts, nees, z = (values(known, name) for name in ("level", "act", "nees", "z"))
     row: Json = {
         "touches": str(least) if least == most else f"{least} to {most}",
         "unknowns": len(known),
         "right": share(values(known, "right")),
         "log_loss": mean(values(known, "loss")),
-        "median_mm": median(present(refined)),
-        "refined_mm": mean(present(refined)),
+        "median_mm": median(refined_there),
+        "refined_mm": mean(refined_there),
         "over_first": mean(refined[both], first_mm[both]) if known is not first else None,
         "mode_mm": mean(present(values(known, "mode_mm"))),
-        "nees": mean(present(nees)),
-        "median_nees": median(present(nees)),
+        "nees": mean(nees),
+        "median_nees": median(nees),
         "coverage_68": share(levels < 0.68),
         "coverage_95": share(levels < 0.95),
         "acts": share(acts),
         "acted_within": share((refined <= NEAR_MM)[acts > 0.0]),
-        "mean_z": float(present(z).mean()),
-        "sd_z": float(present(z).std()),
+        "mean_z": float(z.mean()),
+        "sd_z": float(z.std()),
         "fits": share(values(known, "fits")),
         "unfit": share(values(known, "unfit")),
         "called_none": share(values(known, "none")),
     }
     if strangers:
+        of_strangers = {name: values(strangers, name) for name in strangers[0][0]}
         row |= {
-            "strangers_fit": share(values(strangers, "fits")),
-            "strangers_unfit": share(values(strangers, "unfit")),
-            "strangers_called_none": share(values(strangers, "none")),
-            "told_apart_by_z": told_apart(present(values(strangers, "z")), present(z)),
-            "told_apart_by_none": told_apart(
-                values(known, "none_log_odds"), values(strangers, "none_log_odds")
-            ),
+            "strangers_fit": share(of_strangers["fits"]),
+            "strangers_unfit": share(of_strangers["unfit"]),
+            "strangers_called_none": share(of_strangers["none"]),
+            "told_apart_by_z": told_apart(present(of_strangers["z"]), z),
+            "told_apart_by_none": told_apart(values(known, "none_log_odds"), of_strangers["none_log_odds"]),
         }
     return row
 
@@ -250,8 +244,9 @@ def program() -> None:
         trials="unknowns of each object, and strangers [each scenario's own]",
     )
     flags.add_argument(
-        "scenarios", nargs="*", type=scenario_name, metavar="SCENARIO", help="measure only this or these [all]"
-    )
+        "scenarios", nargs="*", type=scenario_name, metavar="SCENARIO",
+        help="measure only this or these [all]",
+    )  # fmt: skip
     flags.add_argument(
         "--sets", type=at_least_1, default=1, metavar="N",
         help="training sets, each with unknowns of its own [%(default)s]",
@@ -272,7 +267,9 @@ def program() -> None:
         scores: dict[str, tuple[Scores, Scores]] = {engine: ([], []) for engine in scenario.engines}
         for i in range(options.sets):
             with tempfile.TemporaryDirectory() as folder:
-                recordings = learned_touches(scenario, 1 + i * len(VOWELS))
+                recordings = training_recordings(
+                    scenario.touching, first_seed=1 + i * len(VOWELS), shapes=scenario.learned
+                )
                 if options.quick:
                     recordings = [recording[::5] for recording in recordings]
                 maps, grids = learn(device, scenario, recordings, options.palpate, folder)

@@ -10,11 +10,11 @@
 
 #include <fmt/format.h>
 
-#include "answers.hpp"
 #include "cases.hpp"
 #include "letters.hpp"
 #include "model/random.hpp"
 #include "palpate/bounded_posterior.hpp"
+#include "palpate/estimate.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "report.hpp"
 
@@ -22,15 +22,19 @@ namespace palpate::bench {
 
 namespace {
 
-/// What the parts of `palpate-bench bounded` work on.
+/// What the parts of `palpate-bench bounded` work on. Each part adds its cases to the report and
+/// returns a record of every run.
 struct BoundedInputs {
   Device& device;
-  const std::vector<Hypothesis>& letters;
+  std::vector<Hypothesis> letters;
   bool quick = false;
 
   int unknowns() const { return quick ? 3 : 20; }
   std::int64_t bins_in_all(const PoseLattice& lattice) const {
     return lattice.bins() * static_cast<std::int64_t>(letters.size());
+  }
+  std::vector<Recording> recordings(std::uint64_t seed) const {
+    return unknown_recordings(unknowns(), touches_per_unknown, seed);
   }
   Json facts() const {
     return {
@@ -38,16 +42,82 @@ struct BoundedInputs {
   }
 };
 
-// Each part adds its cases to the report and returns a record of every run.
+/// Answers of a belief, [unknown], and what they took.
+struct Answers {
+  std::vector<double> seconds = {};  ///< of update() and estimate()
+  std::vector<Estimate> estimates = {};
+
+  /// Takes in the touches and asks once; what was known before counts too.
+  template <typename Belief>
+  const Estimate& ask(Belief& belief, std::span<const Touch> touches) {
+    Estimate& estimate = estimates.emplace_back();
+    seconds.push_back(seconds_of([&] {
+      belief.update(touches);
+      estimate = belief.estimate();
+    }));
+    return estimate;
+  }
+  void add(const Answers& others) {
+    seconds.insert(seconds.end(), others.seconds.begin(), others.seconds.end());
+    estimates.insert(estimates.end(), others.estimates.begin(), others.estimates.end());
+  }
+  double median_ms() const { return 1e3 * median(seconds); }
+  /// A number of the certificates, which bounds alone have.
+  template <typename Number>
+  std::vector<double> certified(Number Certificate::*number) const {
+    std::vector<double> numbers;
+    for (const Estimate& estimate : estimates) {
+      numbers.push_back(static_cast<double>((*estimate.certificate).*number));
+    }
+    return numbers;
+  }
+  int modes_certain() const {
+    return static_cast<int>(std::ranges::count(certified(&Certificate::mode_certain), 1.0));
+  }
+  /// The figures of every answer by bounds, [unknown] each.
+  Json record() const {
+    std::vector<double> milliseconds = seconds;
+    std::ranges::for_each(milliseconds, [](double& s) { s *= 1e3; });
+    return {{"milliseconds", milliseconds},
+            {"bins_evaluated", certified(&Certificate::bins_evaluated)},
+            {"dropped_mass", certified(&Certificate::dropped_mass)},
+            {"mode_certain", modes_certain()}};
+  }
+};
+
+/// Asks once about each unknown after all of its touches, from the uniform belief on.
+/// @param warm_up asks about the first unknown once more before, which does not count
+template <typename Belief>
+Answers answer_each(Belief& belief, std::span<const Recording> unknowns, bool warm_up) {
+  belief.reset();
+  if (warm_up) {
+    Answers().ask(belief, all_touches(unknowns.front()));
+  }
+  Answers answers;
+  for (const Recording& unknown : unknowns) {
+    belief.reset();
+    answers.ask(belief, all_touches(unknown));
+  }
+  return answers;
+}
+
+/// Rows of times, bins evaluated and certificate. `name` begins the names of the times.
+std::vector<Measurement> measurements_of(const Answers& answers, const std::string& name,
+                                         std::int64_t bins_in_all, std::optional<Goal> median_ms) {
+  const double evaluated = median(answers.certified(&Certificate::bins_evaluated));
+  return {{name + ", median", answers.median_ms(), "ms", median_ms},
+          {name + ", least", 1e3 * std::ranges::min(answers.seconds), "ms"},
+          {name + ", most", 1e3 * std::ranges::max(answers.seconds), "ms"},
+          {"bins evaluated, median", evaluated, "bins"},
+          {"of all bins", 100.0 * evaluated / static_cast<double>(bins_in_all), "%"},
+          {"certificate, largest", std::ranges::max(answers.certified(&Certificate::dropped_mass)),
+           "mass"},
+          share_of("mode certain", answers.modes_certain(), answers.estimates.size())};
+}
 
 constexpr std::uint64_t speed_seed = 1'400'000'000;
-
-struct Size {
-  PoseLattice lattice;
-  int dense = 0;  ///< unknowns that the dense engine answers, too
-  std::optional<double> most_ms = {};
-  bool on_one_thread = false;  ///< `most_ms` holds for one thread
-};
+constexpr std::uint64_t streaming_seed = 1'401'000'000;
+constexpr std::uint64_t large_seed = 1'402'000'000;
 
 /// How many of the dense modes the bounded answers have too, by bin or by likelihood up to 1e-3
 /// nats, by which the histogram's float32 may order two bins otherwise.
@@ -65,106 +135,65 @@ int same_modes(const Answers& bounded, const Answers& dense) {
 
 /// Median milliseconds by which a new posterior's first answer takes longer than the same answer
 /// after reset(): what the tables cost, whenever they are built.
-double table_ms(const BoundedInputs& inputs, const BoundedOptions& options,
-                const Recording& unknown) {
+double table_ms(const BoundedInputs& inputs, const PoseLattice& lattice, const Recording& unknown) {
   constexpr int repeats = 5;
   const std::vector<Touch> touches = all_touches(unknown);
   std::vector<double> ms;
   for (int i = 0; i < repeats; ++i) {
     std::optional<BoundedPosterior> posterior;
     Answers answers;
-    const double first_ms = 1e3 * seconds_of([&] {
-                              posterior.emplace(inputs.letters, options);
-                              answers.ask(*posterior, touches);
-                            });
+    const double first_s = seconds_of([&] {
+      posterior.emplace(inputs.letters, BoundedOptions{.lattice = lattice});
+      answers.ask(*posterior, touches);
+    });
     posterior->reset();
     answers.ask(*posterior, touches);
-    ms.push_back(first_ms - 1e3 * answers.seconds.back());
+    ms.push_back(1e3 * (first_s - answers.seconds.back()));
   }
   return median(ms);
 }
 
-std::vector<Size> sizes_of(const BoundedInputs& inputs) {
-  if (inputs.quick) {
-    return {{lattice_of(5, 5, 4), 3}, {lattice_of(10, 10, 10), 3}};
-  }
-  return {{lattice_of(25, 25, 16), 20, 2.0, true},
-          {lattice_of(100, 100, 100), 20, 8.0},
-          {lattice_of(200, 200, 250), 2, 20.0}};
-}
-
-Json measure_size(const BoundedInputs& inputs, const Size& size,
-                  const std::vector<Recording>& unknowns, Report& report) {
-  constexpr double most_table_ms = 30.0;
-  const BoundedOptions options{.lattice = size.lattice};
-  BoundedOptions one_thread = options;
-  one_thread.threads = 1;
-  const std::int64_t bins = inputs.bins_in_all(size.lattice);
-  const double tables_ms = table_ms(inputs, options, unknowns.front());
-  BoundedPosterior threaded(inputs.letters, options);
-  BoundedPosterior single(inputs.letters, one_thread);
-  const Answers all = answer_each(threaded, unknowns, true);
-  const Answers one = answer_each(single, unknowns, true);
-  PoseHistogram histogram(inputs.device, inputs.letters, {.lattice = size.lattice});
-  const Answers dense = answer_each(
-      histogram, std::span(unknowns).first(static_cast<std::size_t>(size.dense)), false);
-
-  const auto goal = [&](bool on_one) {
-    return size.most_ms && on_one == size.on_one_thread ? std::optional(at_most(*size.most_ms))
-                                                        : std::nullopt;
-  };
-  Case measured{.name = fmt::format("speed {}", size_of(size.lattice)),
-                .facts = inputs.facts(),
-                .measurements = measurements_of(all, "all threads", bins, goal(false))};
-  measured.facts["path"] = threaded.path();
-  std::vector<Measurement>& rows = measured.measurements;
-  rows.push_back({"one thread, median", one.median_ms(), "ms", goal(true)});
-  rows.push_back({"tables, once", tables_ms, "ms", at_most(most_table_ms)});
-  rows.push_back({"dense engine, median", dense.median_ms(), "ms"});
-  rows.push_back({"dense over bounded, all threads", dense.median_ms() / all.median_ms(), "times"});
-  rows.push_back(
-      share_of("the dense engine's mode", same_modes(all, dense), dense.estimates.size()));
-  report.add(measured);
-  return {{"bins", size_of(size.lattice)}, {"bins_in_all", bins},
-          {"path", threaded.path()},       {"host_bytes", threaded.host_bytes()},
-          {"table_ms", tables_ms},         {"all_threads", all.record()},
-          {"one_thread", one.record()},    {"dense_seconds", dense.seconds}};
-}
-
-constexpr std::uint64_t streaming_seed = 1'401'000'000;
-constexpr double budget_s = 0.1;
-constexpr double most_dropped_first = 1e-2;
-
-/// Least share of the first touches whose dropped mass is small, in percent: 16 of 20.
-constexpr double least_share_first = 80.0;
-
-void add_case(const Answers& answers, const std::string& touches, std::int64_t bins,
-              const std::optional<Goal>& median_ms, bool first, Report& report) {
-  const std::vector<double> dropped = answers.certified(&Certificate::dropped_mass);
-  Case measured{
-      .name = "streaming, " + touches,
-      .facts = {{"bins in all", bins}, {"answers", dropped.size()}},
-      .measurements = measurements_of(answers, "from touch to estimate", bins, median_ms)};
-  measured.measurements.push_back({"dropped mass, median", median(dropped), "mass"});
-  const auto small = [&](double most) {
-    return static_cast<int>(
-        std::ranges::count_if(dropped, [most](double mass) { return mass <= most; }));
-  };
-  measured.measurements.push_back(
-      first ? share_of(fmt::format("dropped mass at most {}", most_dropped_first),
-                       small(most_dropped_first), dropped.size(), at_least(least_share_first))
-            : share_of("dropped mass within the tolerance", small(BoundedOptions{}.tolerance),
-                       dropped.size()));
-  report.add(measured);
-}
-
 /// Nine touches in one update on lattices of 10^4 to 10^7 bins per object, beside the dense engine.
 Json measure_bounded_speed(const BoundedInputs& inputs, Report& report) {
-  const std::vector<Recording> unknowns =
-      unknown_recordings(inputs.unknowns(), touches_per_unknown, speed_seed);
+  constexpr double most_table_ms = 30.0;
+  struct Size {
+    PoseLattice lattice;
+    std::size_t dense;  ///< unknowns that the dense engine answers, too
+    std::optional<Goal> all_threads = {};
+    std::optional<Goal> one_thread = {};
+  };
+  const std::vector<Size> sizes =
+      inputs.quick ? std::vector<Size>{{lattice_of(5, 5, 4), 3}, {lattice_of(10, 10, 10), 3}}
+                   : std::vector<Size>{{lattice_of(25, 25, 16), 20, {}, at_most(2.0)},
+                                       {lattice_of(100, 100, 100), 20, at_most(8.0)},
+                                       {lattice_of(200, 200, 250), 2, at_most(20.0)}};
+  const std::vector<Recording> unknowns = inputs.recordings(speed_seed);
   Json records = Json::array();
-  for (const Size& size : sizes_of(inputs)) {
-    records.push_back(measure_size(inputs, size, unknowns, report));
+  for (const Size& size : sizes) {
+    const double tables_ms = table_ms(inputs, size.lattice, unknowns.front());
+    BoundedPosterior threaded(inputs.letters, {.lattice = size.lattice});
+    BoundedPosterior single(inputs.letters, {.lattice = size.lattice, .threads = 1});
+    const Answers all = answer_each(threaded, unknowns, true);
+    const Answers one = answer_each(single, unknowns, true);
+    PoseHistogram histogram(inputs.device, inputs.letters, {.lattice = size.lattice});
+    const Answers dense = answer_each(histogram, std::span(unknowns).first(size.dense), false);
+    const double ratio = dense.median_ms() / all.median_ms();
+    Case measured{.name = "speed " + size_of(size.lattice),
+                  .facts = inputs.facts(),
+                  .measurements = measurements_of(
+                      all, "all threads", inputs.bins_in_all(size.lattice), size.all_threads)};
+    measured.facts["path"] = threaded.path();
+    measured.add(
+        {{"one thread, median", one.median_ms(), "ms", size.one_thread},
+         {"tables, once", tables_ms, "ms", at_most(most_table_ms)},
+         {"dense engine, median", dense.median_ms(), "ms"},
+         {"dense over bounded, all threads", ratio, "times"},
+         share_of("the dense engine's mode", same_modes(all, dense), dense.estimates.size())});
+    report.add(measured);
+    records.push_back({{"bins", size_of(size.lattice)},
+                       {"all_threads", all.record()},
+                       {"one_thread", one.record()},
+                       {"dense_seconds", dense.seconds}});
   }
   return records;
 }
@@ -175,30 +204,28 @@ Json measure_bounded_mode(const BoundedInputs& inputs, Report& report) {
   constexpr double most_with_tables_ms = 40.0;
   // Steps of 0.5 mm and 1 degree.
   const PoseLattice lattice = inputs.quick ? lattice_of(10, 10, 12) : lattice_of(40, 40, 360);
-  const std::vector<Recording> unknowns =
-      unknown_recordings(inputs.unknowns(), touches_per_unknown, speed_seed);
-  const std::int64_t bins = inputs.bins_in_all(lattice);
-  const BoundedOptions options{.lattice = lattice};
-  BoundedPosterior posterior(inputs.letters, options);
+  const std::vector<Recording> unknowns = inputs.recordings(speed_seed);
+  BoundedPosterior posterior(inputs.letters, {.lattice = lattice});
   const Answers answers = answer_each(posterior, unknowns, true);
-  const double tables_ms = table_ms(inputs, options, unknowns.front());
+  const double with_tables_ms = answers.median_ms() + table_ms(inputs, lattice, unknowns.front());
   Case measured{.name = "mode " + size_of(lattice),
                 .facts = inputs.facts(),
-                .measurements = measurements_of(answers, "to the mode", bins, at_most(most_ms))};
-  measured.measurements.push_back({"tables included, median", answers.median_ms() + tables_ms, "ms",
-                                   at_most(most_with_tables_ms)});
+                .measurements = measurements_of(answers, "to the mode", inputs.bins_in_all(lattice),
+                                                at_most(most_ms))};
+  measured.add({{"tables included, median", with_tables_ms, "ms", at_most(most_with_tables_ms)}});
   report.add(measured);
-  return {{"bins", size_of(lattice)}, {"table_ms", tables_ms}, {"answers", answers.record()}};
+  return {{"bins", size_of(lattice)}, {"answers", answers.record()}};
 }
 
 /// Touch after touch, each with an estimate, the first within a budget.
 Json measure_bounded_streaming(const BoundedInputs& inputs, Report& report) {
+  constexpr double budget_s = 0.1;
+  constexpr double most_dropped_first = 1e-2;
+  constexpr double least_share_first = 80.0;  // percent: of 16 of 20
   const PoseLattice lattice = inputs.quick ? lattice_of(10, 10, 8) : lattice_of(200, 200, 250);
-  const std::int64_t bins = inputs.bins_in_all(lattice);
   BoundedPosterior posterior(inputs.letters, {.lattice = lattice, .budget_s = budget_s});
   std::vector<Answers> after(touches_per_unknown);  // [touch]
-  const std::vector<Recording> unknowns =
-      unknown_recordings(inputs.unknowns(), touches_per_unknown, streaming_seed);
+  const std::vector<Recording> unknowns = inputs.recordings(streaming_seed);
   Answers().ask(posterior, all_touches(unknowns.front()));  // warms up
   for (const Recording& unknown : unknowns) {
     posterior.reset();
@@ -207,30 +234,42 @@ Json measure_bounded_streaming(const BoundedInputs& inputs, Report& report) {
     }
   }
   Answers later;
-  for (std::size_t i = 2; i < after.size(); ++i) {
-    later.add(after[i]);
-  }
-  // The budget is for the search. The touch is taken in before.
-  add_case(after[0], "touch 1", bins, at_most(1.1e3 * budget_s), true, report);
-  add_case(after[1], "touch 2", bins, at_most(40.0), false, report);
-  add_case(later, fmt::format("touches 3 to {}", after.size()), bins, at_most(20.0), false, report);
   Json records = Json::array();
   for (std::size_t i = 0; i < after.size(); ++i) {
-    Json record{{"touch", i + 1}, {"bins_in_all", bins}, {"budget_s", budget_s}};
-    record.update(after[i].record());
-    records.push_back(std::move(record));
+    if (i >= 2) {
+      later.add(after[i]);
+    }
+    records.push_back({{"touch", i + 1}, {"budget_s", budget_s}});
+    records.back().update(after[i].record());
   }
+  const auto add_case = [&](const Answers& answers, const std::string& touches, double most_ms) {
+    const std::vector<double> dropped = answers.certified(&Certificate::dropped_mass);
+    const std::int64_t bins = inputs.bins_in_all(lattice);
+    Case measured{
+        .name = "streaming, " + touches,
+        .facts = {{"bins in all", bins}, {"answers", dropped.size()}},
+        .measurements = measurements_of(answers, "from touch to estimate", bins, at_most(most_ms))};
+    const bool first = &answers == &after.front();
+    const double most = first ? most_dropped_first : BoundedOptions{}.tolerance;
+    const auto small = std::ranges::count_if(dropped, [&](double mass) { return mass <= most; });
+    measured.add({{"dropped mass, median", median(dropped), "mass"},
+                  share_of(first ? fmt::format("dropped mass at most {}", most)
+                                 : "dropped mass within the tolerance",
+                           static_cast<int>(small), dropped.size(),
+                           first ? std::optional(at_least(least_share_first)) : std::nullopt)});
+    report.add(measured);
+  };
+  // The budget is for the search. The touch is taken in before.
+  add_case(after[0], "touch 1", 1.1e3 * budget_s);
+  add_case(after[1], "touch 2", 40.0);
+  add_case(later, fmt::format("touches 3 to {}", after.size()), 20.0);
   return records;
 }
-
-constexpr std::uint64_t large_seed = 1'402'000'000;
-
-double mib(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
 
 struct LargeScene {
   int objects = 0;
   double most_ms = 0.0;
-  std::optional<double> most_mib = {};
+  std::optional<Goal> memory_mib = {};
   DisplacementSd touch_sd = {};  ///< by which touches are off, and which the posterior is told
 };
 
@@ -246,25 +285,19 @@ void misplace(Recording& recording, const DisplacementSd& sd, std::uint64_t seed
   }
 }
 
-/// The region about the pivot, in steps of 0.5 mm and 2 degrees.
-PoseLattice lattice_over(double extent_mm, bool quick) {
-  const int count = quick ? 20 : static_cast<int>(4.0 * extent_mm);
-  const Axis axis{-extent_mm, extent_mm, count};
-  return {.x_mm = axis, .y_mm = axis, .theta_rad = {0.0, 2.0 * std::numbers::pi, quick ? 12 : 180}};
-}
-
-/// `about_touches` turns theta about the first touch, as --pivot-mm auto; else about the robot
-/// frame's origin, which then lies as far away as the region reaches.
+/// Bins of 0.5 mm and 2 degrees about the pivot. `about_touches` turns theta about the first touch,
+/// as --pivot-mm auto; else about the robot frame's origin, which then lies as far away as the
+/// region reaches.
 Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool about_touches,
                    const std::vector<Hypothesis>& objects, Report& report) {
   const double extent_mm = inputs.quick ? 20.0 : 100.0;
-  const PoseLattice lattice = lattice_over(extent_mm, inputs.quick);
+  const Axis axis{-extent_mm, extent_mm, inputs.quick ? 20 : static_cast<int>(4.0 * extent_mm)};
+  const PoseLattice lattice{.x_mm = axis,
+                            .y_mm = axis,
+                            .theta_rad = {0.0, 2.0 * std::numbers::pi, inputs.quick ? 12 : 180}};
+  const std::int64_t bins = lattice.bins() * scene.objects;
   std::vector<Recording> unknowns =
       glyph_unknowns(scene.objects, inputs.unknowns(), touches_per_unknown, extent_mm, large_seed);
-  for (std::size_t i = 0; i < unknowns.size(); ++i) {
-    misplace(unknowns[i], scene.touch_sd, large_seed + i);
-  }
-  const auto bins = lattice.bins() * static_cast<std::int64_t>(objects.size());
   restart_peak_memory();
   const std::uint64_t before = resident_bytes();
   std::optional<BoundedPosterior> posterior;
@@ -273,38 +306,37 @@ Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool ab
   });
   Answers answers;
   int right = 0;
-  for (const Recording& unknown : unknowns) {
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    misplace(unknowns[i], scene.touch_sd, large_seed + i);
     posterior->reset();
     if (about_touches) {
-      posterior->move_pivot(unknown.T_robot_sensor.front().translation_mm);
+      posterior->move_pivot(unknowns[i].T_robot_sensor.front().translation_mm);
     }
-    const std::vector<double> identity = answers.ask(*posterior, all_touches(unknown)).identity;
+    const std::vector<double> identity = answers.ask(*posterior, all_touches(unknowns[i])).identity;
     const auto best = std::ranges::max_element(identity) - identity.begin();
-    right += objects[static_cast<std::size_t>(best)].map.label == unknown.object ? 1 : 0;
+    right += objects[static_cast<std::size_t>(best)].map.label == unknowns[i].object ? 1 : 0;
   }
-  const std::uint64_t peak = peak_resident_bytes() - before;
+  const auto mib = [](std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); };
+  const double peak_mib = mib(peak_resident_bytes() - before);
   const std::string pivot = about_touches ? "the first touch" : "the robot's origin";
+  const bool misplaced = !scene.touch_sd.none();
   Case measured{
       .name = fmt::format("large, {} objects, {}pivot at {}", objects.size(),
-                          scene.touch_sd.none() ? "" : "misplaced touches, ", pivot),
+                          misplaced ? "misplaced touches, " : "", pivot),
       .facts = {{"region", fmt::format("±{} mm, all angles", extent_mm)},
                 {"bins", size_of(lattice)},
                 {"bins in all", bins},
                 {"touches", touches_per_unknown},
                 {"unknowns", unknowns.size()}},
       .measurements = measurements_of(answers, "all threads", bins, at_most(scene.most_ms))};
-  const auto most_mib = scene.most_mib ? std::optional(at_most(*scene.most_mib)) : std::nullopt;
-  measured.measurements.push_back({"construction", 1e3 * seconds, "ms"});
-  measured.measurements.push_back(
-      {"held by the posterior", mib(posterior->host_bytes()), "MiB", most_mib});
-  measured.measurements.push_back({"peak of the process above before", mib(peak), "MiB", most_mib});
-  measured.measurements.push_back(share_of("object right", right, unknowns.size()));
+  measured.add({{"construction", 1e3 * seconds, "ms"},
+                {"held by the posterior", mib(posterior->host_bytes()), "MiB", scene.memory_mib},
+                {"peak of the process above before", peak_mib, "MiB", scene.memory_mib},
+                share_of("object right", right, unknowns.size())});
   report.add(measured);
   return {{"objects", objects.size()},
-          {"misplaced", !scene.touch_sd.none()},
+          {"misplaced", misplaced},
           {"pivot", pivot},
-          {"bins_in_all", bins},
-          {"peak_bytes", peak},
           {"host_bytes", posterior->host_bytes()},
           {"answers", answers.record()}};
 }
@@ -312,10 +344,10 @@ Json measure_scene(const BoundedInputs& inputs, const LargeScene& scene, bool ab
 /// Many objects, far away, also by misplaced touches: time and memory.
 Json measure_bounded_large(const BoundedInputs& inputs, Report& report) {
   constexpr DisplacementSd sd{1.0, 0.05};
+  const Goal mib = at_most(200.0);
   const std::vector<LargeScene> scenes =
-      inputs.quick
-          ? std::vector<LargeScene>{{3, 120.0, 200.0}, {3, 120.0, 200.0, sd}}
-          : std::vector<LargeScene>{{20, 120.0, 200.0}, {100, 600.0}, {20, 3000.0, {}, sd}};
+      inputs.quick ? std::vector<LargeScene>{{3, 120.0, mib}, {3, 120.0, mib, sd}}
+                   : std::vector<LargeScene>{{20, 120.0, mib}, {100, 600.0}, {20, 3000.0, {}, sd}};
   Json records = Json::array();
   for (const LargeScene& scene : scenes) {
     const std::vector<Hypothesis> objects =
@@ -331,8 +363,8 @@ Json measure_bounded_large(const BoundedInputs& inputs, Report& report) {
 
 void measure_bounded(const RunOptions& options, std::span<char* const> command_line) {
   Report report(options, command_line);
-  const std::vector<Hypothesis> letters = letter_maps(report.device(), training_recordings());
-  const BoundedInputs inputs{report.device(), letters, options.quick};
+  const BoundedInputs inputs{report.device(), letter_maps(report.device(), training_recordings()),
+                             options.quick};
   constexpr decltype(&measure_bounded_speed) measures[] = {
       measure_bounded_speed, measure_bounded_mode, measure_bounded_streaming, measure_bounded_large,
       [](const BoundedInputs& inputs, Report& /*report*/) {

@@ -6,7 +6,7 @@ Times are measured in C++, by `palpate-bench bounded`.
 import json
 import math
 import pathlib
-import time
+from collections.abc import Sequence
 from statistics import median_low
 from typing import Any
 
@@ -18,21 +18,12 @@ from matplotlib.patches import Patch, Rectangle
 
 import palpate
 from palpate import _charts as charts
-from palpate._sweep_runs import counts_of
-from palpate._tables import (
-    Column,
-    Table,
-    column,
-    count_text,
-    number,
-    plain,
-    print_table,
-    seconds_text,
-)
+from palpate._tables import Column, Table, column, count_text, number, plain, seconds_text
 
 from .certificates import check_certificate, dense_posterior
 from .measures import share_record, with_interval
 from .program import Json, begin, main, parser, write
+from .sweep_runs import asked_after
 from .trials import TABLE_1, VOWELS, Bins, Floats, lattice_of, letter_maps, make_trials
 
 SEED = 1_404_000_000
@@ -67,9 +58,7 @@ PRESSES: list[Column] = [
 LEVELS = (("#a8ccf0", 0.05, 0.26), ("#1a66b8", 0.05, 0.26), ("#e65c0d", 0.4, 0.95))
 
 
-def measure_accuracy(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid], quick: bool
-) -> list[Json]:
+def measure_accuracy(device: palpate.Device, maps: list[palpate.OccupancyGrid], quick: bool) -> list[Json]:
     """Certificates beside the distances from the posterior over all bins, after 3 and 9 touches."""
     sizes: list[Bins] = [*TABLE_1[:2]] if quick else [*TABLE_1, (44, 44, 52), (100, 100, 100)]
     trials = make_trials(VOWELS, 1 if quick else 10, 9, SEED)
@@ -146,8 +135,7 @@ def measure_presses(device: palpate.Device, folder: str, quick: bool) -> Json:
     # Steps of half a pitch and 2.5 degrees.
     step_mm = pitch_mm / 2.0 * (10.0 if quick else 1.0)
     x, y = (
-        palpate.Axis(-extent, extent, math.floor(2.0 * extent / step_mm + 0.5))
-        for extent in (50.0, 31.0)
+        palpate.Axis(-extent, extent, math.floor(2.0 * extent / step_mm + 0.5)) for extent in (50.0, 31.0)
     )
     lattice = palpate.PoseLattice(x, y, (0.0, 2.0 * math.pi, 4 if quick else 144))
     bounded = palpate.BoundedPosterior(device, maps, lattice, contact=CONTACT)
@@ -161,34 +149,33 @@ def measure_presses(device: palpate.Device, folder: str, quick: bool) -> Json:
                 dense.append(_answer(histogram, recording[frame : frame + 1]))
                 dense[-1]["same"] = dense[-1]["best"] == answers[-1]["best"]
     seconds, evaluated = (column(answers, of) for of in ("seconds", "bins_evaluated"))
-    frames = len(answers)
+
+    def share_of(those: Sequence[bool]) -> Json:
+        return share_record(sum(those), len(those))
+
     record: Json = {
-        "bins": counts_of(lattice),
         "bins_in_all": lattice.bins * len(maps),
         "objects": len(maps),
-        "frames": frames,
-        "host_bytes": bounded.host_bytes,
+        "frames": len(answers),
         "median_s": median_low(seconds),
         "least_s": min(seconds),
         "most_s": max(seconds),
         "median_bins": median_low(evaluated),
         "largest_dropped": max(column(answers, "dropped_mass")),
-        "mode_certain": share_record(sum(of["mode_certain"] for of in answers), frames),
+        "mode_certain": share_of([of["mode_certain"] for of in answers]),
         "dense_s": median_low(column(dense, "seconds")),
-        "same_best": share_record(sum(of["same"] for of in dense), len(dense)),
-        "right": share_record(sum(of["best"] == of["label"] for of in answers), frames),
+        "same_best": share_of([of["same"] for of in dense]),
+        "right": share_of([of["best"] == of["label"] for of in answers]),
     }
-    print_table(PRESSES, [record])
+    Table(PRESSES, [record])
     return record | {"answers": answers, "dense": dense}
 
 
 def _answer(belief: Any, touches: palpate.Recording) -> Json:
     """The belief in one unknown: its best object, what a certificate says, and the seconds."""
     belief.reset()
-    start = time.perf_counter()
-    belief.update(touches)
-    estimate = belief.estimate()
-    answer: Json = {"seconds": time.perf_counter() - start, "best": int(numpy.argmax(estimate.identity))}
+    seconds, estimate = asked_after(belief, touches)
+    answer: Json = {"seconds": seconds, "best": int(numpy.argmax(estimate.identity))}
     if certificate := estimate.certificate:
         names = ("bins_evaluated", "dropped_mass", "mode_certain")
         answer |= {name: getattr(certificate, name) for name in names}
@@ -261,9 +248,7 @@ def program() -> None:
     )
     flags.add_argument("--part", choices=("accuracy", "presses"), help="measure only this part")
     flags.add_argument("--presses", metavar="FOLDER", help="recordings of everyday objects")
-    flags.add_argument(
-        "--times", metavar="FILE", help="results of build/palpate-bench bounded --json FILE"
-    )
+    flags.add_argument("--times", metavar="FILE", help="results of build/palpate-bench bounded --json FILE")
     options = flags.parse_args()
     if options.part == "presses" and not options.presses:
         flags.error("--part presses: give the folder of recordings by --presses FOLDER")

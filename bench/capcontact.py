@@ -7,26 +7,17 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import palpate
 from palpate import _charts as charts
-from palpate._tables import Column, number, plain, print_table
+from palpate._statistics import present
+from palpate._tables import Column, Table, column, number, plain
 
-from .contact_array import (
-    AS_BUILT,
-    PIXEL_MM,
-    RATIO,
-    SPREAD_MM,
-    THRESHOLD,
-    Press,
-    Registration,
-    read_presses,
-    touched,
-)
+from .contact_array import AS_BUILT, PIXEL_MM, RATIO, SPREAD_MM, THRESHOLD, Press, Registration
+from .contact_array import read_presses, touched
 from .contact_learning import Learned, Learning
-from .measures import level_in_modes, wrapped
+from .measures import level_in_modes, turning, wrapped
 from .program import Json, begin, main, parser, write
 from .trials import Floats, truth_of
 
@@ -81,19 +72,17 @@ class Trial(NamedTuple):
     ) -> dict[str, tuple["Trial", Json]]:
         """After each of SHOWN, as a trial of these windows and the belief."""
 
-        def record(trial: Trial, trace: bool) -> Json:
-            touches = trial.touches(registration)
+        def steps(trial: Trial, trace: bool) -> Any:
             # Steps before the last, too, tell improbable objects, for the log-loss.
-            closely: Any = {"filter": "bounded", "tolerance": 1e-6}
             (found,) = palpate.recognize(
-                touches, grids, trace=trace, none=0.0, **closely, **REGION, **options
-            )
-            return found
+                trial.touches(registration), grids, trace=trace, none=0.0, filter="bounded", tolerance=1e-6,
+                **REGION, **options,
+            )  # fmt: skip
+            return found.get("trace", [found])
 
-        all_windows = self._replace(windows=self.press.tiles())
-        steps = record(self, trace=True)["trace"]
-        after = {str(n): (self._replace(windows=self.windows[:n]), steps[n - 1]) for n in WINDOWS}
-        return after | {WHOLE: (all_windows, record(all_windows, trace=False))}
+        all_windows, after = self._replace(windows=self.press.tiles()), steps(self, True)
+        beliefs = {str(n): (self._replace(windows=self.windows[:n]), after[n - 1]) for n in WINDOWS}
+        return beliefs | {WHOLE: (all_windows, steps(all_windows, False)[-1])}
 
 
 def draw_round(presses: Sequence[Press], objects: int, random: numpy.random.Generator) -> list[Trial]:
@@ -114,19 +103,17 @@ def score(trial: Trial, step: Json, random: numpy.random.Generator) -> Json:
     truth = truth_of(trial.touches(AS_BUILT))
     right = step["best"] == trial.label
     error = numpy.array((step.get("refined") or step["mode"])["T_robot_object"]) - trial.T_robot_object
-    turn = trial.T_robot_object[2]
-    in_sheet = numpy.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
     squared = [math.inf]
     for mode in step["modes"]:
         if mode["object"] == trial.label:
             off = numpy.array(mode["T_robot_object"]) - trial.T_robot_object
-            off[2] = wrapped(off[2], 2.0 * math.pi)
+            off[2] = wrapped(off[2])
             squared.append(float(off @ numpy.linalg.solve(mode["covariance"], off)))
     return {
         "right": right,
-        "moved_mm": (in_sheet @ error[:2]).tolist() if right else None,
+        "moved_mm": (turning(-trial.T_robot_object[2]) @ error[:2]).tolist() if right else None,
         "error_mm": math.hypot(*error[:2]) if right else None,
-        "error_deg": abs(math.degrees(wrapped(error[2], 2.0 * math.pi))) if right else None,
+        "error_deg": abs(math.degrees(wrapped(error[2]))) if right else None,
         "loss": -math.log(max(step["identity"].get(trial.label, 0.0), 1e-30)),
         "level": level_in_modes(step["modes"], truth, random),
         "among_modes": min(squared) < AMONG_MODES,
@@ -140,13 +127,10 @@ def summary(scores: Sequence[Json]) -> Json:
     The bias is the mean over those within 5 mm: what lies farther off is another mode.
     """
     count = len(scores)
-    of_right = {
-        name: numpy.array([one[name] for one in scores if one["right"]], float).reshape(-1, *shape)
-        for name, shape in {"error_mm": (), "error_deg": (), "moved_mm": (2,)}.items()
-    }
-    mm, deg = of_right["error_mm"], of_right["error_deg"]
-    near = of_right["moved_mm"][mm < 5.0]
-    bias = near.mean(axis=0).tolist() if len(near) else [None, None]
+    mm, deg = (present(column(scores, name)) for name in ("error_mm", "error_deg"))
+    near = [one["moved_mm"] for one in scores if one["right"] and one["error_mm"] < 5.0]
+    bias = numpy.mean(near, axis=0).tolist() if near else [None, None]
+    seen = [one["right"] for one in scores if one["seen"]]
     record: Json = {
         "unknowns": count,
         "recognised": len(mm) / count,
@@ -154,12 +138,11 @@ def summary(scores: Sequence[Json]) -> Json:
         "bias_mm": bias,
         "bias_x_mm": bias[0],
         "bias_y_mm": bias[1],
-        "log_loss": float(numpy.mean([one["loss"] for one in scores])),
+        "log_loss": float(column(scores, "loss").mean()),
         "among_modes": sum(one["among_modes"] for one in scores) / count,
+        "seen": len(seen) / count,
+        "recognised_where_seen": sum(seen) / len(seen) if seen else None,
     }
-    seen = [one["right"] for one in scores if one["seen"]]
-    record["seen"] = len(seen) / count
-    record["recognised_where_seen"] = sum(seen) / len(seen) if seen else None
     for share in (68, 95):
         record[f"coverage_{share}"] = sum(one["level"] < share / 100.0 for one in scores) / count
     for name, errors in (("mm", mm), ("deg", deg)):
@@ -171,50 +154,38 @@ def summary(scores: Sequence[Json]) -> Json:
 def draw_errors(scores: Json) -> Figure:
     """Median errors of the place against windows, with bands that hold the middle 80 %."""
     axes = charts.chart("windows", "error of the place of recognised unknowns, mm", yscale="log")
-    for name, colour in zip(SENSORS, charts.COLOURS, strict=False):
-        errors = [[one["error_mm"] for one in scores[name][str(n)] if one["right"]] for n in WINDOWS]
-        bands = [numpy.quantile(of, (0.1, 0.5, 0.9)) if of else [math.nan] * 3 for of in errors]
+    for (name, words), colour in zip(SENSORS.items(), charts.COLOURS, strict=False):
+        errors = [present(column(scores[name][str(n)], "error_mm")) for n in WINDOWS]
+        bands = [numpy.quantile(of, (0.1, 0.5, 0.9)) if len(of) else [math.nan] * 3 for of in errors]
         low, median, high = numpy.array(bands).T
         axes.fill_between(WINDOWS, low, high, color=colour, alpha=0.15, linewidth=0)
-        axes.plot(WINDOWS, median, color=colour, label=f"{SENSORS[name]}: median, middle 80 %")
+        axes.plot(WINDOWS, median, color=colour, label=f"{words}: median, middle 80 %")
     axes.set_xticks(WINDOWS)
     charts.rule(axes, 2.0, "2 mm")
     return charts.finished(axes)
 
 
-def draw_press(trial: Trial, step: Json, presses: dict[str, Press], axes: Axes) -> None:
-    """The readings of a trial's windows where they lie, the true contact, and the modes of the belief."""
-
-    def outline(press: Press, pose: Any, **style: Any) -> None:
-        rows, columns = press.contact.shape
-        pixels = numpy.stack(numpy.meshgrid(numpy.arange(columns), numpy.arange(rows)), axis=-1)
-        in_object = PIXEL_MM * pixels.reshape(-1, 2) - press.centroid_mm
-        x, y = palpate.transform(pose, in_object).T.reshape(2, rows, columns)
-        axes.contour(x, y, press.contact, levels=[0.5], **style)
-
-    touches = trial.touches(AS_BUILT)
-    places = [palpate.transform(pose, touches.elements_mm) for pose in touches.T_robot_sensor]
-    x, y = numpy.concatenate(places).T
-    axes.scatter(x, y, c=touches.pressure.ravel(), s=12, marker="s", cmap="Blues", vmin=-100.0, vmax=600.0)
-    for mode in reversed(step["modes"]):
-        style: Json = {"colors": [charts.COLOURS[1]], "linewidths": 2.0}
-        outline(
-            presses[mode["object"]], mode["T_robot_object"], alpha=max(mode["probability"], 0.1), **style
-        )
-    outline(trial.press, trial.T_robot_object, colors="black", linewidths=1.0, linestyles="dashed")
-    axes.set_title(f"{len(trial.windows)} of 5 windows: readings (blue), contact (dashed), modes (orange)")
-    axes.set(xlabel="x, mm", ylabel="y, mm", aspect="equal", xlim=(-130, 130), ylim=(-130, 130))
-    axes.grid(visible=False)
+def draw_press(beliefs: dict[str, tuple[Trial, Json]]) -> bytes:
+    """The readings of one window and of five where they lie, the true contact, and the belief."""
+    figure = Figure(figsize=(11.4, 5.4))
+    for windows, axes in zip(("1", "5"), figure.subplots(1, 2), strict=True):
+        trial, step = beliefs[windows]
+        trial.touches(AS_BUILT).plot(axes)
+        palpate.Record(step).plot(axes)
+        press = trial.press
+        pixels = numpy.argwhere(numpy.ones_like(press.contact))[:, ::-1]
+        places = palpate.transform(trial.T_robot_object, PIXEL_MM * pixels - press.centroid_mm)
+        x, y = places.T.reshape(2, *press.contact.shape)
+        axes.contour(x, y, press.contact, levels=[0.5], colors="black", linestyles="dashed")
+        axes.set(xlim=(-130, 130), ylim=(-130, 130))
+        axes.set_title(f"{windows} of 5 windows: readings, contact (dashed) and belief")
+    return charts.image(figure, "png", dpi=100)
 
 
 def recognise(
-    device: palpate.Device,
-    presses: Sequence[Press],
-    learned: dict[int, Learned],
-    rounds: int,
-    objects: int,
+    device: palpate.Device, presses: Sequence[Press], learned: dict[int, Learned], rounds: int, objects: int
 ) -> tuple[dict[str, dict[str, list[Json]]], Any]:
-    """The scores by sensor and windows, and the beliefs of a press that is recognised, with all presses.
+    """The scores by sensor and windows, and the beliefs of a press that is recognised.
 
     learned: without the person who pressed, by person.
     """
@@ -222,6 +193,7 @@ def recognise(
     random, in_beliefs = numpy.random.default_rng(SEED), numpy.random.default_rng(SEED + 2)
     scores: dict[str, dict[str, list[Json]]] = {name: {n: [] for n in SHOWN} for name in SENSORS}
     example: Any = None
+    eq7: Any = {"threshold": THRESHOLD, "ratio": RATIO}
     for _ in range(rounds):
         trials = draw_round(presses, objects, random)
         maps = {
@@ -230,18 +202,16 @@ def recognise(
         }
         for trial in trials:
             own = learned[trial.press.person]
-            eq7: Any = {"threshold": THRESHOLD, "ratio": RATIO}
+            grids = maps[own.settings.spread_mm]
             beliefs = {
                 "eq7": trial.beliefs(maps[SPREAD_MM], AS_BUILT, device=device, **eq7),
-                "learned": trial.beliefs(
-                    maps[own.settings.spread_mm], own.registration, device=device, sensor_model=own.sensor
-                ),
+                "learned": trial.beliefs(grids, own.registration, device=device, sensor_model=own.sensor),
             }
             for sensor, after in beliefs.items():
                 for n, belief in after.items():
                     scores[sensor][n].append(score(*belief, in_beliefs))
             if example is None and scores["learned"]["5"][-1]["right"]:
-                example = beliefs["learned"], {one.label: one.press for one in trials}
+                example = beliefs["learned"]
     return scores, example
 
 
@@ -250,22 +220,17 @@ def results(scores: dict[str, dict[str, list[Json]]], learned: dict[int, Learned
     summaries: Json = {
         sensor: {"windows": {n: summary(of) for n, of in by.items()}} for sensor, by in scores.items()
     }
-    rows = [
-        {"sensor": SENSORS[sensor], "windows": n} | summaries[sensor]["windows"][n]
+    Table(COLUMNS, [
+        {"sensor": words, "windows": n} | summaries[sensor]["windows"][n]
         for n in SHOWN
-        for sensor in SENSORS
-    ]
-    print_table(COLUMNS, rows)
-    people = {str(person): one for person, one in learned.items()}
-    return summaries | {
-        "registration": {name: one.registration.coefficients.tolist() for name, one in people.items()},
-        "settings": {
-            name: one.settings._asdict()
-            | {"pose_scale": dict(zip(("factor", "map_sd_mm"), one.pose_scale, strict=True))}
-            for name, one in people.items()
-        },
-        "unknowns": scores,
-    }
+        for sensor, words in SENSORS.items()
+    ])  # fmt: skip
+    registration, settings = {}, {}
+    for person, one in learned.items():
+        scale = dict(zip(("factor", "map_sd_mm"), one.pose_scale, strict=True))
+        registration[str(person)] = one.registration.coefficients.tolist()
+        settings[str(person)] = one.settings._asdict() | {"pose_scale": scale}
+    return summaries | {"registration": registration, "settings": settings, "unknowns": scores}
 
 
 def program() -> None:
@@ -311,12 +276,7 @@ def program() -> None:
     write(options.json, facts | last | documents)
     charts.save({"capcontact": draw_errors(scores)}, options.plots)
     if options.plots and example:
-        beliefs, of_labels = example
-        figure = Figure(figsize=(11.4, 5.4))
-        for windows, axes in zip(("1", "5"), figure.subplots(1, 2), strict=True):
-            trial, step = beliefs[windows]
-            draw_press(trial, step, of_labels, axes)
-        write(pathlib.Path(options.plots, "capcontact_press.png"), charts.image(figure, "png", dpi=100))
+        write(pathlib.Path(options.plots, "capcontact_press.png"), draw_press(example))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <functional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -20,13 +18,6 @@ struct Inputs {
   ContactModel model;               ///< that of the letters' histograms
   std::vector<Recording> unknowns;  ///< of touches_per_unknown touches
 };
-
-/// Difference in nats between the log-likelihoods of some bins of every object, drawn with a fixed
-/// seed, and the float64 reference of the touches. `log_likelihood` gives all bins of an object.
-ErrorStatistics likelihood_errors(
-    std::span<const Hypothesis> objects, const ContactModel& model, const PoseLattice& lattice,
-    std::span<const Touch> touches, int bins_per_object,
-    const std::function<std::vector<double>(int object)>& log_likelihood);
 
 /// Whether identity and mode are the same to the last digit.
 bool same(const Estimate& a, const Estimate& b);

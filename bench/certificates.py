@@ -56,9 +56,7 @@ def dense_posterior(
         below = numpy.cumsum(numpy.exp(flat[rising] - flat.max()))
         for bin_ in rising[below > _NEGLIGIBLE].tolist():
             pose = lattice.T_object_robot(bin_)
-            flat[bin_] = math.fsum(
-                reference.log_likelihood(touch, pose, grid, contact) for touch in touches
-            )
+            flat[bin_] = math.fsum(reference.log_likelihood(touch, pose, grid, contact) for touch in touches)
         bins.append(logs)
     evidence = numpy.array([log_weight + log_sum_exp(logs) for logs in bins])
     total = log_sum_exp(evidence)
@@ -82,16 +80,12 @@ def check_certificate(bounded: palpate.BoundedPosterior, dense: DensePosterior) 
     estimate = bounded.estimate()
     mode, certificate = estimate.mode, estimate.certificate
     assert certificate is not None
-    evidence_low, evidence_high = numpy.array(certificate.log_evidence).T
-    low, high = numpy.array(estimate.identity_bounds).T
-    holds = numpy.all(
-        (evidence_low - SUMMING_ERROR <= dense.log_evidence)
-        & (dense.log_evidence <= evidence_high + SUMMING_ERROR)
-        & (low - SUMMING_ERROR <= dense.identity)
-        & (dense.identity <= high + SUMMING_ERROR)
-    )
-    marginals = [bounded.marginals(i) for i in range(len(low))]
-    counted, total = log_sum_exp(evidence_low), log_sum_exp(dense.log_evidence)
+    low, high = numpy.concatenate([certificate.log_evidence, estimate.identity_bounds]).T
+    exact = numpy.concatenate([dense.log_evidence, dense.identity])
+    holds = numpy.all((low - SUMMING_ERROR <= exact) & (exact <= high + SUMMING_ERROR))
+    objects = len(dense.identity)
+    marginals = [bounded.marginals(i) for i in range(objects)]
+    counted, total = log_sum_exp(low[:objects]), log_sum_exp(dense.log_evidence)
     errors = {
         "mass_outside": max(0.0, -math.expm1(counted - total)),
         "total_variation": max(
@@ -109,5 +103,6 @@ def check_certificate(bounded: palpate.BoundedPosterior, dense: DensePosterior) 
         "promised": promised,
         "measured": measured,
         "holds": bool(holds) and measured <= promised + SUMMING_ERROR,
+        "bins_evaluated": certificate.bins_evaluated,
         "same_mode": same or abs(mode.log_likelihood - dense.mode[2]) <= SUMMING_ERROR,
     }

@@ -3,13 +3,15 @@
 import math
 import pathlib
 import tempfile
+from collections.abc import Sequence
+from typing import Any
 
 import numpy
 from numpy.typing import NDArray
 
 import palpate
 from palpate._palpate import Random, Stream
-from palpate._tables import Column, Table, number, plain
+from palpate._tables import Column, Table, column, number, plain
 
 from .program import Json, begin, main, parser, write
 
@@ -69,11 +71,9 @@ def misread(pressure: Floats, options: tuple[str, str]) -> Floats:
     return (grid.transpose(0, 2, 1) if columns else grid).reshape(pressure.shape)
 
 
-def with_poses(touches: Touches, poses: list[Floats]) -> Touches:
-    return [
-        palpate.Recording(one.pressure, pose, one.elements_mm, object=one.object)
-        for one, pose in zip(touches, poses, strict=True)
-    ]
+def changed(one: palpate.Recording, pressure: Any, poses: Any) -> palpate.Recording:
+    """The touches with other readings, or at other poses."""
+    return palpate.Recording(pressure, poses, one.elements_mm, object=one.object)
 
 
 class Set:
@@ -91,14 +91,15 @@ class Set:
             for k, (shape, pose) in enumerate(zip(self.shapes, poses, strict=True))
         ]
 
+    def posed(self, poses: Sequence[Floats]) -> Touches:
+        pairs = zip(self.touches, poses, strict=True)
+        return [changed(one, one.pressure, pose) for one, pose in pairs]
+
     def misread(self) -> tuple[tuple[str, str], Touches]:
         """Touches whose elements are read in another order, and the options that say so."""
         options = list(ORDERS)[1 + int(self.random.uniforms(1)[0] * (len(ORDERS) - 1))]
         return options, [
-            palpate.Recording(
-                misread(one.pressure, options), one.T_robot_sensor, one.elements_mm, object=one.object
-            )
-            for one in self.touches
+            changed(one, misread(one.pressure, options), one.T_robot_sensor) for one in self.touches
         ]
 
     def misplaced(self) -> tuple[Floats, Touches]:
@@ -109,17 +110,16 @@ class Set:
         """The same anywhere within 60 mm and at any angle."""
         part, way, turn = self.random.uniforms(3)
         far, way = FAR_MM * math.sqrt(part), 2 * math.pi * way
-        return self.mounted(
-            numpy.array([far * math.cos(way), far * math.sin(way), math.pi * (2 * turn - 1)])
-        )
+        return self.mounted(numpy.array([far * math.cos(way), far * math.sin(way), math.pi * (2 * turn - 1)]))
 
     def mounted(self, offset: Floats) -> tuple[Floats, Touches]:
         back = palpate.inverse(offset)
-        poses = [
-            numpy.array([palpate.compose(pose, back) for pose in one.T_robot_sensor])
-            for one in self.touches
-        ]
-        return offset, with_poses(self.touches, poses)
+        return offset, self.posed(
+            [
+                numpy.array([palpate.compose(pose, back) for pose in one.T_robot_sensor])
+                for one in self.touches
+            ]
+        )
 
     def beyond(self) -> dict[str, Touches]:
         """Touches with faults that no set-up which is tried explains."""
@@ -128,92 +128,71 @@ class Set:
         orders = [numpy.argsort(self.random.uniforms(TOUCHES)) for _ in poses]
         gains = numpy.ones(len(self.elements_mm))
         gains[: len(gains) // 2] = GAIN
+        mixed = [
+            [numpy.concatenate([a[:half], b[half:]]) for a, b in zip(of, of[1:] + of[:1], strict=True)]
+            for of in ([one.pressure for one in self.touches], poses)
+        ]
         return {
-            "late": with_poses(self.touches, [numpy.roll(pose, LATE, axis=0) for pose in poses]),
-            "shuffled": with_poses(
-                self.touches, [pose[order] for pose, order in zip(poses, orders, strict=True)]
-            ),
-            "mirrored": with_poses(self.touches, [pose * (-1, 1, 1) for pose in poses]),
-            "two objects": [
-                palpate.Recording(
-                    numpy.concatenate([one.pressure[:half], other.pressure[half:]]),
-                    numpy.concatenate([one.T_robot_sensor[:half], other.T_robot_sensor[half:]]),
-                    one.elements_mm,
-                    object=one.object,
-                )
-                for one, other in zip(self.touches, self.touches[1:] + self.touches[:1], strict=True)
-            ],
-            "gain": [
-                palpate.Recording(
-                    one.pressure * gains, one.T_robot_sensor, one.elements_mm, object=one.object
-                )
-                for one in self.touches
-            ],
+            "late": self.posed([numpy.roll(pose, LATE, axis=0) for pose in poses]),
+            "shuffled": self.posed([pose[order] for pose, order in zip(poses, orders, strict=True)]),
+            "mirrored": self.posed([pose * (-1, 1, 1) for pose in poses]),
+            "two objects": [changed(*of) for of in zip(self.touches, *mixed, strict=True)],
+            "gain": [changed(one, one.pressure * gains, one.T_robot_sensor) for one in self.touches],
         }
 
     def at_one_angle(self) -> Touches:
         angle = 2 * math.pi * self.random.uniforms(1)[0]
-        poses = [one.T_robot_sensor * (1, 1, 0) + (0, 0, angle) for one in self.touches]
-        return self.at(poses)
+        return self.at([one.T_robot_sensor * (1, 1, 0) + (0, 0, angle) for one in self.touches])
 
 
 def checked(device: palpate.Device, one: Set) -> Json:
     """What is found in a set as it is, misread, misplaced near and far, beyond any set-up, and touched
     at one angle."""
 
-    def found(touches: Touches) -> palpate.SetupCheck:
-        return palpate.check_setup(touches, device=device)
+    def found(touches: Touches) -> tuple[Any, list[str]]:
+        """The findings, and their words."""
+        findings = palpate.check_setup(touches, device=device).findings
+        return findings, [finding.words for finding in findings]
 
     record: Json = {"objects": [pathlib.Path(shape).stem for shape in one.shapes]}
-    record["sound"] = [finding.words for finding in found(one.touches).findings]
+    record["sound"] = found(one.touches)[1]
     (first_element, order), touches = one.misread()
-    findings = found(touches).findings
-    words = f"first_element='{first_element}' and order='{order}'"
+    findings, words = found(touches)
     record["order"] = {
-        "right": len(findings) == 1 and words in findings[0].words,
+        "right": len(words) == 1 and f"first_element='{first_element}' and order='{order}'" in words[0],
         "option": f"{first_element} --order {order}",
         "nats": findings[0].nats if findings else 0.0,
-        "words": [finding.words for finding in findings],
+        "words": words,
     }
-    offset, touches = one.misplaced()
-    findings = found(touches).findings
-    record["offset"] = {"true": offset.tolist(), "words": [finding.words for finding in findings]}
-    pose = getattr(findings[0], "array_offset", None) if len(findings) == 1 else None
-    off = offset if pose is None else pose - offset
-    record["offset"] |= {"error_mm": math.hypot(off[0], off[1]), "error_rad": abs(off[2])}
-    if findings and "sd" in findings[0]:
-        record["offset"]["sd"] = findings[0]["sd"]
-    offset, touches = one.far_off()
-    findings = found(touches).findings
-    pose = getattr(findings[0], "array_offset", None) if len(findings) == 1 else None
-    off = offset if pose is None else palpate.compose(palpate.inverse(offset), pose)
-    record["mount"] = {
-        "true": offset.tolist(),
-        "words": [finding.words for finding in findings],
-        "right": pose is not None
-        and math.hypot(off[0], off[1]) <= FAR_NEAR_MM
-        and abs(math.remainder(off[2], 2 * math.pi)) <= FAR_NEAR_RAD,
-    }
+    for name, (offset, touches), near_mm, near_rad in (
+        ("offset", one.misplaced(), NEAR_MM, NEAR_RAD),
+        ("mount", one.far_off(), FAR_NEAR_MM, FAR_NEAR_RAD),
+    ):
+        findings, words = found(touches)
+        pose = getattr(findings[0], "array_offset", None) if len(findings) == 1 else None
+        off = offset if pose is None else palpate.compose(palpate.inverse(offset), pose)
+        mm, rad = math.hypot(off[0], off[1]), abs(math.remainder(off[2], 2 * math.pi))
+        record[name] = {"true": offset.tolist(), "words": words, "error_mm": mm, "error_rad": rad}
+        record[name]["right"] = pose is not None and mm <= near_mm and rad <= near_rad
     record["beyond"] = {
-        name: [finding.words for finding in found(touches).findings if finding.what != "unexplained"]
+        name: [finding.words for finding in found(touches)[0] if finding.what != "unexplained"]
         for name, touches in one.beyond().items()
     }
-    at_one = found(one.at_one_angle())
+    at_one = palpate.check_setup(one.at_one_angle(), device=device)
     said = [remark for remark in at_one.remarks if "at nearly one angle" in remark]
     record["one_angle"] = bool(said) and not at_one.findings
     return record
 
 
 def summary(elements: int, records: list[Json]) -> Json:
-    mm = numpy.array([record["offset"]["error_mm"] for record in records])
-    rad = numpy.array([record["offset"]["error_rad"] for record in records])
+    mm, rad = (column(records, f"offset/error_{of}") for of in ("mm", "rad"))
     return {
         "elements": elements,
         "sets": len(records),
         "sound": sum(not record["sound"] for record in records),
         "order": sum(record["order"]["right"] for record in records),
         "least_order_nats": min(record["order"]["nats"] for record in records),
-        "offset": int(numpy.sum((mm <= NEAR_MM) & (rad <= NEAR_RAD))),
+        "offset": sum(record["offset"]["right"] for record in records),
         "median_mm": float(numpy.median(mm)),
         "median_rad": float(numpy.median(rad)),
         "most_mm": float(numpy.quantile(mm, 0.9)),
@@ -231,7 +210,8 @@ def program() -> None:
         "check",
         "Checks set-ups by sixty touches of each of three objects, in an hour and a half on a CPU core: "
         "sound ones, with the elements in another order, with the array elsewhere in the tool, near or "
-        "far, with faults that no set-up explains, and touched at one angle; with arrays of 36 and 64 elements, or of 36 with --quick.",
+        "far, with faults that no set-up explains, and touched at one angle; with arrays of 36 and 64 "
+        "elements, or of 36 with --quick.",
         trials="sets [100, or 2 with --quick]",
     )
     options = flags.parse_args()
@@ -245,9 +225,7 @@ def program() -> None:
             pathlib.Path(shapes[-1]).write_text(text)
         table = Table(COLUMNS)
         for elements, elements_mm in list(ARRAYS.items())[: 1 if options.quick else None]:
-            records = [
-                checked(device, Set(shapes, elements_mm, SEED + 1000 * k)) for k in range(sets)
-            ]
+            records = [checked(device, Set(shapes, elements_mm, SEED + 1000 * k)) for k in range(sets)]
             all_of[str(elements)] = records
             table.append(summary(elements, records))
     write(options.json, facts | {"check": table, "sets": all_of})

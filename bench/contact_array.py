@@ -114,15 +114,12 @@ def read_presses(path: pathlib.Path) -> list[Press]:
         ) from error
     for name, shape in shapes.items():
         if arrays[name].shape != (len(arrays["participant"]), *shape):
-            raise palpate.Error(
-                f"{path}: {name} has the shape {arrays[name].shape}; give {('n', *shape)}"
-            )
+            raise palpate.Error(f"{path}: {name} has the shape {arrays[name].shape}; give {('n', *shape)}")
     contact = numpy.unpackbits(arrays["mask_bits"], axis=1).astype(bool)
     masks = contact.reshape(-1, ROWS * PIXELS, COLUMNS * PIXELS)
-    of_presses = zip(arrays["capacitance"], masks, arrays["participant"], strict=True)
     return [
         Press(readings.astype(float), mask, int(person))
-        for readings, mask, person in of_presses
+        for readings, mask, person in zip(arrays["capacitance"], masks, arrays["participant"], strict=True)
         if mask.any()
     ]
 
@@ -221,17 +218,16 @@ def find_shifts(
     spread_mm: float = SPREAD_MM,
 ) -> Shifts:
     """Places six windows of every press on its map, each alone, by a sensor or by Eq. 7."""
-    people, places, shifts = [], [], []
+    found = []
     for press in presses:
         grid = press.grid("press", spread_mm)
         for window in press.windows(random, 6):
             record = placed(device, touched(press, window[None], AS_BUILT), grid, sensor)
-            if record["modes"]:
-                people.append(press.person)
-                places.append(AS_BUILT.poses(window[None])[0, :2])
+            for mode in record["modes"][:1]:
+                place = AS_BUILT.poses(window[None])[0, :2]
                 # The object is found where its readings are. Its angle is hardly known, and moves the
                 # centroid of fingers that the window does not show, but not what it shows.
-                middle = places[-1] - press.centroid_mm
-                found = palpate.transform(record["modes"][0]["T_robot_object"], middle[None])[0]
-                shifts.append(found - middle)
-    return Shifts(numpy.array(people), numpy.array(places), numpy.array(shifts))
+                middle = place - press.centroid_mm
+                shift = palpate.transform(mode["T_robot_object"], middle[None])[0] - middle
+                found.append((press.person, place, shift))
+    return Shifts(*map(numpy.array, zip(*found, strict=True)))

@@ -7,22 +7,14 @@ learned with a person's presses fits these better than those of anybody else.
 import math
 import pathlib
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy
 
 import palpate
 
-from .contact_array import (
-    PIXEL_MM,
-    PITCH_MM,
-    Press,
-    Registration,
-    Shifts,
-    find_shifts,
-    placed,
-    touched,
-)
+from .contact_array import PIXEL_MM, PITCH_MM, Press, Registration, Shifts, find_shifts, placed, touched
 from .measures import wrapped
 from .trials import Floats
 
@@ -87,9 +79,6 @@ class Learning:
         """folder: for sensor models. quick: from few windows, and of the first two choices."""
         self._device, self._presses, self._folder, self._quick = device, presses, folder, quick
         self._choices = CHOICES[:2] if quick else CHOICES
-        self._shifts: dict[float, Shifts] = {}
-        self._learned: dict[tuple[Settings, frozenset[int]], Learned] = {}
-        self._errors: dict[tuple[Settings, frozenset[int], int], PoseErrors] = {}
 
     def without(self, people: frozenset[int]) -> Learned:
         """What all but these people tell, with a `pose_scale`.
@@ -103,12 +92,10 @@ class Learning:
                 "presses.npz: it takes presses of three people or more, or of two beside held_out.npz: "
                 "settings and pose scale are those of people who are left out"
             )
-        errors = {
-            settings: self._together(
-                [self._errors_of(settings, people | {person}, person) for person in others]
-            )
-            for settings in self._choices
-        }
+        errors = {}
+        for settings in self._choices:
+            of_people = [self._errors_of(settings, people | {person}, person) for person in others]
+            errors[settings] = PoseErrors(*map(numpy.concatenate, zip(*of_people, strict=True)))
         best = min(self._choices, key=lambda settings: errors[settings].mean_mm)
         learned = self._learn(best, people)
         factor, sd_mm = errors[best].scale()
@@ -117,39 +104,30 @@ class Learning:
         scaled.write_text(learned.sensor.read_text().replace("\ntable:", f"{scale}\ntable:"))
         return learned._replace(sensor=scaled, pose_scale=(factor, sd_mm))
 
-    @staticmethod
-    def _together(errors: Sequence[PoseErrors]) -> PoseErrors:
-        return PoseErrors(*(numpy.concatenate(parts) for parts in zip(*errors, strict=True)))
+    @cache
+    def _shifts_by_eq7(self, spread_mm: float) -> Shifts:
+        random = numpy.random.default_rng(SEED + 1)
+        return find_shifts(self._device, self._presses, random, None, spread_mm)
 
+    @cache
     def _learn(self, settings: Settings, without: frozenset[int]) -> Learned:
         """What all but these people tell by these settings, without a `pose_scale`."""
-        key = settings, without
-        if key not in self._learned:
-            spread_mm = settings.spread_mm
-            random = numpy.random.default_rng(SEED)
-            if spread_mm not in self._shifts:
-                in_shifts = numpy.random.default_rng(SEED + 1)
-                self._shifts[spread_mm] = find_shifts(
-                    self._device, self._presses, in_shifts, None, spread_mm
-                )
-            registration = self._shifts[spread_mm].registration(without)
-            others = [press for press in self._presses if press.person not in without]
-            path = self._folder / f"{len(self._learned)}.yaml"
-            learn_sensor(self._device, others, registration, settings, random, path, quick=self._quick)
-            # A sensor knows what elements read beside a contact, which Eq. 7 does not.
-            shifts = find_shifts(self._device, others, random, path, spread_mm)
-            self._learned[key] = Learned(settings, shifts.registration(), path)
-        return self._learned[key]
+        random = numpy.random.default_rng(SEED)
+        registration = self._shifts_by_eq7(settings.spread_mm).registration(without)
+        others = [press for press in self._presses if press.person not in without]
+        left_out = "-".join(map(str, sorted(without)))
+        path = self._folder / f"{settings.spread_mm:.3f}.{settings.levels}.{left_out}.yaml"
+        learn_sensor(self._device, others, registration, settings, random, path, quick=self._quick)
+        # A sensor knows what elements read beside a contact, which Eq. 7 does not.
+        shifts = find_shifts(self._device, others, random, path, settings.spread_mm)
+        return Learned(settings, shifts.registration(), path)
 
+    @cache
     def _errors_of(self, settings: Settings, without: frozenset[int], person: int) -> PoseErrors:
         """The errors of WINDOWS of a person's presses by what is learned without some people."""
-        key = settings, without, person
-        if key not in self._errors:
-            learned = self._learn(settings, without)
-            random = numpy.random.default_rng((SEED, person))
-            own = [press for press in self._presses if press.person == person]
-            self._errors[key] = pose_errors(self._device, own, learned, random)
-        return self._errors[key]
+        own = [press for press in self._presses if press.person == person]
+        random = numpy.random.default_rng((SEED, person))
+        return pose_errors(self._device, own, self._learn(settings, without), random)
 
 
 def learn_sensor(
@@ -168,28 +146,26 @@ def learn_sensor(
     """
     most, each = (3, 6) if quick else (10, 15)
     near: Any = {"bins": (8, 8, 8), "x_mm": (-8.0, 8.0), "y_mm": (-8.0, 8.0), "theta_deg": (-8.0, 8.0)}
-    chosen = random.permutation(len(presses))[:most]
-    drawn = [presses[k].grid(f"learned {k}", settings.spread_mm) for k in chosen]
-    # A calibration on drawn maps seeks one offset of the array, from 30 counts on: it finds the fingers
-    # above the sheet beside their contact. The windows' poses are already registered by the contact.
-    grids = [
-        palpate.OccupancyGrid(
-            one.label, one.log_odds, cell_mm=one.cell_mm, origin_mm=one.origin_mm, prior=one.prior
+    grids, touches = [], []
+    for k in random.permutation(len(presses))[:most]:
+        # A calibration on drawn maps seeks one offset of the array, from 30 counts on: it finds the fingers
+        # above the sheet beside their contact. The windows' poses are already registered by the contact.
+        drawn = presses[k].grid(f"learned {k}", settings.spread_mm)
+        grids.append(
+            palpate.OccupancyGrid(
+                drawn.label,
+                drawn.log_odds,
+                cell_mm=drawn.cell_mm,
+                origin_mm=drawn.origin_mm,
+                prior=drawn.prior,
+            )  # fmt: skip
         )
-        for one in drawn
-    ]
-    touches = [
-        touched(presses[k], presses[k].windows(random, each), registration, label=grid.label)
-        for k, grid in zip(chosen, grids, strict=True)
-    ]
+        windows = presses[k].windows(random, each)
+        touches.append(touched(presses[k], windows, registration, label=drawn.label))
     calibration = palpate.calibrate(
-        touches,
-        maps=grids,
-        layer="log_odds",
-        levels=settings.levels,
-        device=device,
+        touches, maps=grids, layer="log_odds", levels=settings.levels, device=device,
         **(near if quick else {}),
-    )
+    )  # fmt: skip
     calibration.sensor.save(path)
     lines = [line for line in path.read_text().splitlines() if not line.startswith("pose_scale:")]
     path.write_text("\n".join(lines) + "\n")
@@ -205,13 +181,10 @@ def pose_errors(
         radius_mm = math.sqrt(((numpy.argwhere(press.contact) * PIXEL_MM).var(axis=0)).sum())
         for count in WINDOWS:
             windows = press.windows(random, count)
-            record = placed(
-                device, touched(press, windows, learned.registration), grid, learned.sensor
-            )
-            if record["modes"]:
-                mode = record["modes"][0]
+            touches = touched(press, windows, learned.registration)
+            for mode in placed(device, touches, grid, learned.sensor)["modes"][:1]:
                 error = numpy.array(mode["T_robot_object"])
-                error[2] = wrapped(error[2], 2.0 * math.pi)
+                error[2] = wrapped(error[2])
                 to_mm = numpy.array([1.0, 1.0, radius_mm])
                 moved.append(error * to_mm)
                 covariances.append(numpy.array(mode["covariance"]) * numpy.outer(to_mm, to_mm))

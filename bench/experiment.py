@@ -1,33 +1,25 @@
 """Sec. IV of the paper on simulated letters: histogram and particle filters over touches."""
 
 import argparse
+import itertools
 import time
 from collections.abc import Sequence
-from itertools import groupby
 from typing import Any
 
 import numpy
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 import palpate
 from palpate import _charts as charts
 from palpate._statistics import errors_over, present
-from palpate._tables import Column, Table, column, number, plain, print_table
+from palpate._tables import Column, Table, column, number, plain
 
 from .measures import calibration, share_record, student_record, with_interval
 from .program import Json, at_least_1, begin, main, parser, write
-from .trials import (
-    TABLE_1,
-    VOWELS,
-    Bins,
-    Floats,
-    Touching,
-    letter_maps,
-    make_trials,
-    recognized,
-)
+from .trials import TABLE_1, VOWELS, Bins, Floats, Touching, letter_maps, make_trials, recognized
 
 SEED = 1_000
 #: Nearly as many bins as Table I's, balanced so that a turn by a bin moves a letter as far as a shift
@@ -50,7 +42,7 @@ RUNS: list[Column] = [
     ("trials", "trials", plain),
     ("touches", "last/touches", plain),
     ("time, s", "seconds", number(".1f")),
-    ("right at the end, %", "right", with_interval(".1f", 100.0)),
+    ("right at the end, %", "last/right", with_interval(".1f", 100.0)),
     ("all right from touch", "all_right_from", plain),
     ("mean error, mm", "last/error_mm/mean", _MM),
     ("median", "last/error_mm/median", _MM),
@@ -79,11 +71,12 @@ def run_filter(
     trials: Sequence[palpate.Recording],
     kind: str,
     size: Bins | int,
+    off_by: str,
 ) -> Json:
     """One filter over the trials: so many bins of a histogram, or particles, or of "augmented" MCL.
 
     Each trial has particles of a seed of its own, from 1 on. `count` is of bins per object or of
-    particles in all, `steps` is what recognized() gives.
+    particles in all, `steps` is what recognized() gives. off_by: how far the array is off.
     """
     start = time.perf_counter()
     if isinstance(size, tuple):
@@ -94,12 +87,19 @@ def run_filter(
             recognized(device, maps, [trial], seed=seed, **options)[0]
             for seed, trial in enumerate(trials, start=1)
         ]
+    curve = [point_of(touch, of) for touch, of in enumerate(zip(*steps, strict=True), 1)]
+    less = column(curve, "refined_error_mm/mean") < column(curve, "error_mm/mean")
     return {
         "filter": kind,
         "name": f"{'augmented MCL' if kind == 'augmented' else kind} {plain(size)}",
         "count": int(numpy.prod(size)),
+        "off_by": off_by,
+        "trials": len(trials),
         "seconds": time.perf_counter() - start,
-        "curve": [point_of(touch, of) for touch, of in enumerate(zip(*steps, strict=True), 1)],
+        "curve": curve,
+        "last": curve[-1],
+        "all_right_from": from_touch(column(curve, "accuracy") == 1.0),
+        "refined_less_from": from_touch(less),
         "calibration": calibration(column(steps, "confidence").ravel(), column(steps, "right").ravel()),
         "steps": steps,
     }
@@ -111,6 +111,7 @@ def point_of(touches: int, steps: Sequence[Json]) -> Json:
     errors = errors_over(column(steps, "error_mm"))
     return {
         "touches": touches,
+        "right": right,
         "accuracy": right["mean"],
         "accuracy_low": right["low"],
         "accuracy_high": right["high"],
@@ -121,44 +122,20 @@ def point_of(touches: int, steps: Sequence[Json]) -> Json:
     }
 
 
-def row_of(run: Json, off_by: str) -> Json:
-    """A run's row of RUNS."""
-    curve, last = run["curve"], run["curve"][-1]
-
-    def from_touch(holds: Any) -> int | None:
-        """From which touch on something holds to the end, where it does at the end."""
-        fails = numpy.flatnonzero(~holds)
-        touch = 1 + (fails[-1] + 1 if len(fails) else 0)
-        return touch if touch <= len(curve) else None
-
-    less = column(curve, "refined_error_mm/mean") < column(curve, "error_mm/mean")
-    return run | {
-        "off_by": off_by,
-        "trials": len(run["steps"]),
-        "last": last,
-        "right": {"mean": last["accuracy"], "low": last["accuracy_low"], "high": last["accuracy_high"]},
-        "all_right_from": from_touch(column(curve, "accuracy") == 1.0),
-        "refined_less_from": from_touch(less),
-    }
-
-
-def ranges_of(touches: Sequence[int]) -> str:
-    """Rising touch counts, such as "1-4, 8"."""
-    runs = groupby(enumerate(touches), lambda pair: pair[1] - pair[0])
-    ends = [[touch for _, touch in run] for _, run in runs]
-    return ", ".join(f"{of[0]}-{of[-1]}" if len(of) > 1 else f"{of[0]}" for of in ends)
+def from_touch(holds: NDArray[numpy.bool_]) -> int | None:
+    """From which touch on something holds to the end, where it does at the end."""
+    touch = 1 + int(numpy.append(0, numpy.flatnonzero(~holds) + 1)[-1])
+    return touch if touch <= len(holds) else None
 
 
 def standing(leads: Floats) -> str:
-    """Which of two is ahead after 1, 2, ... touches, by their leads; nothing where one is NaN."""
-    parts = []
-    for word, sign in (("ahead", 1), ("tied", 0), ("behind", -1)):
-        if len(at := numpy.flatnonzero(numpy.sign(leads) == sign)):
-            parts.append(f"{word} at touch {ranges_of((at + 1).tolist())}")
-    return "; ".join(parts)
+    """From which touches on one is ahead, tied or behind, by its leads after 1, 2, ... touches."""
+    words = {1.0: "ahead", 0.0: "tied", -1.0: "behind"}
+    spans = itertools.groupby(enumerate(numpy.sign(leads), 1), lambda each: words.get(each[1], "unknown"))
+    return "; ".join(f"{word} from touch {next(span)[0]}" for word, span in spans)
 
 
-def comparisons_of(runs: Sequence[Json], off_by: str) -> list[Json]:
+def comparisons_of(runs: Sequence[Json]) -> list[Json]:
     """Each histogram against each particle filter of as many particles as it has bins per object.
 
     Trials that the histogram has right, minus those of the particles; and the particles' error minus the
@@ -166,29 +143,31 @@ def comparisons_of(runs: Sequence[Json], off_by: str) -> list[Json]:
     that loses the hard ones.
     """
     rows = []
-    for particles in (run for run in runs if run["filter"] != "histogram"):
-        for histogram in (run for run in runs if run["filter"] == "histogram"):
-            if as_many(histogram["count"], particles["count"]):
-                right, leads_mm = (
-                    sign * (column(histogram["steps"], path) - column(particles["steps"], path))
-                    for sign, path in ((1.0, "right"), (-1.0, "error_mm"))
-                )  # [trial, touch]
-                ahead = right.mean(axis=0)
-                located = [present(of) for of in leads_mm.T]
-                ahead_mm = numpy.array([of.mean() if len(of) else numpy.nan for of in located])
-                rows.append(
-                    {
-                        "histogram": histogram["name"],
-                        "particles": particles["name"],
-                        "off_by": off_by,
-                        "identity": standing(ahead),
-                        "right_lead": float(ahead.mean()),
-                        "last_right_lead": float(ahead[-1]),
-                        "pose": standing(ahead_mm),
-                        "lead_mm": float(numpy.nanmean(ahead_mm)),
-                        "last_lead_mm": student_record(located[-1]) if len(located[-1]) else None,
-                    }
-                )
+    for particles, histogram in itertools.product(runs, runs):
+        if particles["filter"] == "histogram" or histogram["filter"] != "histogram":
+            continue
+        if not as_many(histogram["count"], particles["count"]):
+            continue
+        right, leads_mm = (
+            sign * (column(histogram["steps"], path) - column(particles["steps"], path))
+            for sign, path in ((1.0, "right"), (-1.0, "error_mm"))
+        )  # [trial, touch]
+        ahead = right.mean(axis=0)
+        located = [present(of) for of in leads_mm.T]
+        ahead_mm = numpy.array([of.mean() if len(of) else numpy.nan for of in located])
+        rows.append(
+            {
+                "histogram": histogram["name"],
+                "particles": particles["name"],
+                "off_by": particles["off_by"],
+                "identity": standing(ahead),
+                "right_lead": float(ahead.mean()),
+                "last_right_lead": float(ahead[-1]),
+                "pose": standing(ahead_mm),
+                "lead_mm": float(numpy.nanmean(ahead_mm)),
+                "last_lead_mm": student_record(located[-1]) if len(located[-1]) else None,
+            }
+        )
     return rows
 
 
@@ -202,10 +181,7 @@ def as_many(a: int, b: int) -> bool:
 
 def plot(axes: Axes, run: Json, path: str, label: str, scale: float = 1.0, **look: Any) -> str:
     """A field over touches, with a mark at every fifth, so that the dashes show between: the colour."""
-    curve = run["curve"]
-    touches, values = column(curve, "touches"), scale * column(curve, path)
-    (line,) = axes.plot(touches, values, label=label, markevery=5, **look)
-    return str(line.get_color())
+    return charts.series(axes, run["curve"], "touches", path, label, scale, markevery=5, **look)
 
 
 def draw_accuracy(runs: list[Json]) -> Axes:
@@ -213,12 +189,8 @@ def draw_accuracy(runs: list[Json]) -> Axes:
     axes = charts.chart("touches", "trials with the right letter, and 95 % interval (%)")
     for run in runs:
         colour = plot(axes, run, "accuracy", run["name"], 100.0)
-        touches, *ends = (
-            column(run["curve"], of) for of in ("touches", "accuracy_low", "accuracy_high")
-        )
-        axes.fill_between(
-            touches, 100.0 * ends[0], 100.0 * ends[1], color=colour, alpha=0.12, linewidth=0
-        )
+        touches, low, high = (column(run["curve"], of) for of in ("touches", "accuracy_low", "accuracy_high"))
+        axes.fill_between(touches, 100.0 * low, 100.0 * high, color=colour, alpha=0.12, linewidth=0)
     axes.set_ylim(0.0, 105.0)
     return axes
 
@@ -232,21 +204,20 @@ def draw_errors(runs: list[Json]) -> Axes:
     return axes
 
 
-def draw_noise(document: Json, largest_count: int) -> Axes:
+def draw_noise(levels: Sequence[Json], largest_count: int) -> Axes:
     """Colours tell the noise apart, dashes the filters, each with its largest count."""
     title = "standard deviation of the error of the reported sensor pose"
     axes = charts.chart("touches", MEAN_ERROR, title, yscale="log")
-    undisplaced = {"translation_mm": 0.0, "rotation_rad": 0.0, "filters": document["filters"]}
     for kind, count, look in (
         ("histogram", largest_count, charts.SOLID),
         ("particles", MOST_PARTICLES, charts.DASHED),
     ):
-        for colour, level in zip(charts.COLOURS, [undisplaced, *document["pose_noise"]], strict=False):
+        for colour, level in zip(charts.COLOURS, levels, strict=False):
             for run in level["filters"]:
                 if run["filter"] == kind and run["count"] == count:
                     off = f"{level['translation_mm']:g} mm, {level['rotation_rad']:g} rad"
                     plot(axes, run, "error_mm/mean", f"{run['name']}, {off}", color=colour, **look)
-    axes.set_xlim(right=len(document["pose_noise"][0]["filters"][0]["curve"]) + 0.5)
+    axes.set_xlim(right=len(levels[-1]["filters"][0]["curve"]) + 0.5)
     return axes
 
 
@@ -268,33 +239,39 @@ def draw_calibration(runs: list[Json]) -> Axes:
     return axes
 
 
-def draw(document: Json) -> dict[str, Figure]:
+def draw(levels: Sequence[Json]) -> dict[str, Figure]:
     """Fig. 6a, 6b, 7a and 7b with the paper's headline numbers, and what goes beyond the paper."""
     histograms, particles, augmented = (
-        [run for run in document["filters"] if run["filter"] == kind]
+        [run for run in levels[0]["filters"] if run["filter"] == kind]
         for kind in ("histogram", "particles", "augmented")
     )
-    drawn = {"fig6a": draw_accuracy(particles), "fig7a": draw_accuracy(histograms)}
+    most = max(run["count"] for run in histograms)
+    largest = [run for run in histograms if as_many(run["count"], most)]
+    finest = next(run for run in largest if run["count"] == most)
+    y = "pose error of trials with the right letter (mm)"
+    drawn = {
+        "fig6a": draw_accuracy(particles),
+        "fig6b": draw_errors(particles),
+        "fig7a": draw_accuracy(histograms),
+        "fig7b": draw_errors(histograms),
+        "augmented": charts.chart("touches", "trials with the right letter (%)"),
+        "errors": charts.chart("touches", y, finest["name"], yscale="log"),
+        "refined": charts.chart("touches", MEAN_ERROR, yscale="log"),
+        "pose_noise": draw_noise(levels, most),
+        # All particle filters would hide more than they show.
+        "calibration": draw_calibration([*histograms, particles[-1]]),
+    }
     charts.rule(drawn["fig6a"], PUBLISHED_PARTICLE_ACCURACY, "paper: 10,000 particles level out")
+    charts.rule(drawn["fig7b"], PUBLISHED_ERROR_MM, f"paper: {PUBLISHED_ERROR_MM} mm")
     for mark, (count, touches) in zip("PD", PUBLISHED_BINS_KNOW_AFTER.items(), strict=True):
         look: Json = {"color": charts.GREY, "markersize": 8, "linestyle": ""}
         label = f"paper: {count:,} bins reach 100 %"
         drawn["fig7a"].plot(touches, 100.0, marker=mark, label=label, **look)
-    drawn |= {"fig6b": draw_errors(particles), "fig7b": draw_errors(histograms)}
-    charts.rule(drawn["fig7b"], PUBLISHED_ERROR_MM, f"paper: {PUBLISHED_ERROR_MM} mm")
-
-    drawn["augmented"] = charts.chart("touches", "trials with the right letter (%)")
     for runs, dash in ((particles, "-"), (augmented, "--")):
         for colour, run in zip(charts.COLOURS, runs, strict=False):
             look = {"color": colour, "linestyle": dash}
             plot(drawn["augmented"], run, "accuracy", run["name"], 100.0, **look)
     drawn["augmented"].set_ylim(0.0, 105.0)
-
-    most = max(run["count"] for run in histograms)
-    largest = [run for run in histograms if as_many(run["count"], most)]
-    finest = next(run for run in largest if run["count"] == most)
-    y = "pose error of trials with the right letter (mm)"
-    drawn["errors"] = charts.chart("touches", y, finest["name"], yscale="log")
     for label, path in (
         ("mode, mean", "error_mm/mean"),
         ("mode, 95th percentile", "error_mm/p95"),
@@ -303,13 +280,9 @@ def draw(document: Json) -> dict[str, Figure]:
         ("refined, mean", "refined_error_mm/mean"),
     ):
         plot(drawn["errors"], finest, path, label)
-    drawn["refined"] = charts.chart("touches", MEAN_ERROR, yscale="log")
     for run in largest:
         plot(drawn["refined"], run, "error_mm/mean", f"{run['name']}, mode")
         plot(drawn["refined"], run, "refined_error_mm/mean", f"{run['name']}, refined")
-    drawn["pose_noise"] = draw_noise(document, most)
-    # All particle filters would hide more than they show.
-    drawn["calibration"] = draw_calibration([*histograms, particles[-1]])
     return {name: charts.finished(axes) for name, axes in drawn.items()}
 
 
@@ -330,20 +303,16 @@ def measure(options: argparse.Namespace) -> None:
         trials = make_trials(VOWELS, each, limit, SEED, Touching(noise=(mm, rad)))
         runs = []
         for kind, size in kinds if undisplaced else of_noise:
-            runs.append(run_filter(device, maps, trials, kind, size))
-            table.append(row_of(runs[-1], off_by))
-        comparisons += comparisons_of(runs, off_by)
+            runs.append(run_filter(device, maps, trials, kind, size, off_by))
+            table.append(runs[-1])
+        comparisons += comparisons_of(runs)
         without = [{name: of for name, of in run.items() if name != "steps"} for run in runs]
         levels.append({"translation_mm": mm, "rotation_rad": rad, "filters": without})
-    print_table(COMPARISONS, comparisons)
-    document = facts | {
-        "filters": levels[0]["filters"],
-        "comparisons": comparisons,
-        "pose_noise": levels[1:],
-    }
-    write(options.json, document)
+    Table(COMPARISONS, comparisons)
+    document = {"filters": levels[0]["filters"], "comparisons": comparisons, "pose_noise": levels[1:]}
+    write(options.json, facts | document)
     if options.plots:
-        charts.save(draw(document), options.plots)
+        charts.save(draw(levels), options.plots)
 
 
 def program() -> None:

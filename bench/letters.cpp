@@ -5,8 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "palpate/error.hpp"
-
 namespace palpate::bench {
 
 namespace {
@@ -18,18 +16,8 @@ static_assert(characters.size() * scales.size() == most_glyphs);
 
 constexpr double drawn_within_mm = 10.0;  ///< by random_object_pose()
 
-Simulator simulator_of(const Shape& shape, std::uint64_t seed) {
-  return {shape, SensorModel{}, digitacts_array(), seed};
-}
-
-Simulator letter_simulator(char letter, std::uint64_t seed) {
-  return simulator_of(make_shape(std::string(1, letter)), seed);
-}
-
-Simulator glyph_simulator(int i, std::uint64_t seed) {
-  const auto at = static_cast<std::size_t>(i);
-  const double scale = scales[at / characters.size()];
-  Shape shape = make_shape(std::string(1, characters[at % characters.size()]));
+Simulator simulator_of(char character, std::uint64_t seed, double scale = 1.0) {
+  Shape shape = make_shape(std::string(1, character));
   for (Shape::Stroke& stroke : shape.strokes) {
     stroke.width_mm *= scale;
     for (glm::dvec2& point_mm : stroke.points_mm) {
@@ -39,7 +27,12 @@ Simulator glyph_simulator(int i, std::uint64_t seed) {
   if (scale != 1.0) {
     shape.label += fmt::format(" x {}", scale);
   }
-  return simulator_of(shape, seed);
+  return {shape, SensorModel{}, digitacts_array(), seed};
+}
+
+Simulator glyph_simulator(int i, std::uint64_t seed) {
+  const auto at = static_cast<std::size_t>(i);
+  return simulator_of(characters[at % characters.size()], seed, scales[at / characters.size()]);
 }
 
 /// An unknown at a random pose, x and y within `extent_mm` of 0, touched at random poses about it,
@@ -63,7 +56,7 @@ std::vector<Recording> training_recordings() {
   std::vector<Recording> recordings;
   for (const char letter : vowels) {
     recordings.push_back(
-        letter_simulator(letter, recordings.size() + 1).touch(training_grid(), Pose{}));
+        simulator_of(letter, recordings.size() + 1).touch(training_grid(), Pose{}));
   }
   return recordings;
 }
@@ -89,7 +82,7 @@ std::vector<Hypothesis> letter_maps(Device& device, const std::vector<Recording>
 std::vector<Recording> unknown_recordings(int count, int touches, std::uint64_t seed) {
   std::vector<Simulator> simulators;
   for (const char letter : vowels) {
-    simulators.push_back(letter_simulator(letter, ++seed));
+    simulators.push_back(simulator_of(letter, ++seed));
   }
   std::vector<Recording> recordings;
   for (int i = 0; i < count; ++i) {
@@ -100,9 +93,6 @@ std::vector<Recording> unknown_recordings(int count, int touches, std::uint64_t 
 }
 
 std::vector<Recording> glyph_recordings(int count) {
-  if (count < 1 || count > most_glyphs) {
-    throw Error(Fault::input, fmt::format("objects = {}: give 1 to {}", count, most_glyphs));
-  }
   std::vector<Recording> recordings;
   for (int i = 0; i < count; ++i) {
     recordings.push_back(glyph_simulator(i, recordings.size() + 1).touch(training_grid(), Pose{}));

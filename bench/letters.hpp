@@ -28,7 +28,6 @@ inline constexpr int most_glyphs = 108;
 
 /// `count` objects, touched at the training poses: the letters A to Z, then the digits, then both
 /// at 0.8 and at 1.2 times the size.
-/// @throws Error unless count is from 1 to most_glyphs
 std::vector<Recording> glyph_recordings(int count);
 
 /// Unknowns among the first `count` glyphs, in turn, at random poses T_object_robot: x and y within

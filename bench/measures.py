@@ -126,9 +126,7 @@ def normalised_error(
     pose, true = numpy.asarray(estimate), numpy.asarray(truth)
     centroid_mm = Body.of(grid).centroid_mm
     if grid.symmetry == 0:
-        here, there = (
-            palpate.transform(palpate.inverse(of), [centroid_mm])[0] for of in (pose, true)
-        )
+        here, there = (palpate.transform(palpate.inverse(of), [centroid_mm])[0] for of in (pose, true))
         turn = turning(-pose[2])
         x, y = centroid_mm - pose[:2]
         jacobian = numpy.column_stack([-turn, turn @ (y, -x)])
@@ -138,7 +136,7 @@ def normalised_error(
     turn_rad -= wrapped(turn_rad, 2.0 * math.pi / grid.symmetry)
     about = centroid_mm - turning(turn_rad) @ centroid_mm
     error = pose - palpate.compose([*about, turn_rad], true)
-    error[2] = wrapped(error[2], 2.0 * math.pi)
+    error[2] = wrapped(error[2])
     return float(error @ numpy.linalg.solve(covariance, error))
 
 
@@ -149,7 +147,7 @@ def densities(modes: Sequence[Json], label: str, poses: Floats) -> Floats:
         if mode["object"] != label:
             continue
         d = poses - mode["T_robot_object"]
-        d[:, 2] = wrapped(d[:, 2], 2.0 * math.pi)
+        d[:, 2] = wrapped(d[:, 2])
         covariance = numpy.array(mode["covariance"])
         squared = numpy.einsum("ni,ij,nj->n", d, numpy.linalg.inv(covariance), d)
         height = mode["probability"] / math.sqrt((2.0 * math.pi) ** 3 * numpy.linalg.det(covariance))
@@ -181,7 +179,7 @@ def turning(angle_rad: float) -> NDArray[numpy.float64]:
     return numpy.array([[c, -s], [s, c]])
 
 
-def wrapped(angles_rad: Any, period_rad: float) -> Any:
+def wrapped(angles_rad: Any, period_rad: float = 2.0 * math.pi) -> Any:
     """Angles in [-period/2, period/2)."""
     return (angles_rad + period_rad / 2.0) % period_rad - period_rad / 2.0
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy
 
 import palpate
-from palpate._tables import Column, number, plain, print_table
+from palpate._tables import Column, Table, number, plain
 
 from .bounded import CLASSIFIER, pitch_of, read_presses
 from .measures import share_record, with_interval
@@ -33,9 +33,9 @@ COLUMNS: list[Column] = [
 def together(records: Sequence[Json]) -> dict[str, float]:
     """What presses of one object say of its label: each lies at a pose of its own."""
     labels = list(records[0]["identity"])
-    logs = numpy.log(
-        [[max(record["identity"][label], LEAST) for label in labels] for record in records]
-    ).sum(axis=0)
+    logs = numpy.log([[max(record["identity"][label], LEAST) for label in labels] for record in records]).sum(
+        axis=0
+    )
     p = numpy.exp(logs - logs.max())
     return dict(zip(labels, (p / p.sum()).tolist(), strict=True))
 
@@ -83,18 +83,11 @@ def program() -> None:
         learned: list[str] = []
         tried: list[str] = []
         for recording in recordings:
-            label = recording.object
-            pose = recording.T_robot_sensor
             for start, files in ((0, learned), (1, tried)):
-                files.append(str(folder / f"{label}.{start}.h5"))
-                palpate.Recording(
-                    recording.pressure[start::2],
-                    pose[start::2],
-                    recording.elements_mm,
-                    object=label,
-                    pressure_unit=recording.pressure_unit,
-                    truth=palpate.Truth(label, (0.0, 0.0, 0.0)),
-                ).save(files[-1])
+                files.append(str(folder / f"{recording.object}.{start}.h5"))
+                half = recording[start::2]
+                half.truth = palpate.Truth(recording.object, (0.0, 0.0, 0.0))
+                half.save(files[-1])
         result = folder / "records.json"
         widest = (REACH + 0.5) * pitch_of(recordings[0].elements_mm)
         region = [f"--{axis}-mm={-widest}:{widest}" for axis in "xy"]
@@ -114,7 +107,7 @@ def program() -> None:
             of_sensor = [scores(records, presses, random) for presses in TOGETHER]
             document[key] = {"presses": {str(one["presses"]): one for one in of_sensor}}
             rows += [{"sensor": words} | one for one in of_sensor]
-    print_table(COLUMNS, rows)
+    Table(COLUMNS, rows)
     write(options.json, facts | document)
 
 

@@ -12,9 +12,7 @@ from palpate._program import Json, write
 __all__ = ["Json", "at_least_1", "begin", "main", "parser", "run_palpate", "write"]
 
 
-def parser(
-    name: str, description: str, *, plots: str = "", trials: str = ""
-) -> argparse.ArgumentParser:
+def parser(name: str, description: str, *, plots: str = "", trials: str = "") -> argparse.ArgumentParser:
     """The flags that programs have. plots, trials: what these flags give; without, there is none."""
     flags = argparse.ArgumentParser(f"./dev bench {name}", description=description)
     flags.add_argument("--json", metavar="FILE", help="write the results to this file")

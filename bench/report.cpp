@@ -21,11 +21,9 @@ namespace {
 
 constexpr const char* row = "| {:<28} | {:<46} | {:<28} | {:<8} | {:<7} |\n";
 
-/// Strings as they are, numbers in their shortest form.
+/// Strings without quotes, numbers in their shortest form.
 std::string plain_text(const Json& value) {
-  return value.is_string()         ? value.get<std::string>()
-         : value.is_number_float() ? fmt::format("{}", value.get<double>())
-                                   : value.dump();
+  return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
 /// A field of /proc/self/status, which are in KiB; 0 where there is none.
@@ -39,16 +37,6 @@ std::uint64_t status_bytes(std::string_view field) {
   return 0;
 }
 
-/// Seconds of the last of the calls that fill a fifth of a second.
-double seconds_at_full_clock(const std::function<void()>& call) {
-  constexpr double ramp_s = 0.2;
-  double last = 0.0;
-  for (double all = 0.0; all < ramp_s; all += last) {
-    last = seconds_of(call);
-  }
-  return last;
-}
-
 }  // namespace
 
 double seconds_of(const std::function<void()>& call) {
@@ -59,10 +47,15 @@ double seconds_of(const std::function<void()>& call) {
 
 std::vector<std::vector<double>> interleave(std::span<const std::function<void()>> contenders,
                                             int repeats) {
+  constexpr double ramp_s = 0.2;
   std::vector<std::vector<double>> seconds(contenders.size());
   for (int repeat = 0; repeat < repeats; ++repeat) {
     for (std::size_t i = 0; i < contenders.size(); ++i) {
-      seconds[i].push_back(seconds_at_full_clock(contenders[i]));
+      double last = 0.0;
+      for (double all = 0.0; all < ramp_s; all += last) {
+        last = seconds_of(contenders[i]);
+      }
+      seconds[i].push_back(last);
     }
   }
   return seconds;
@@ -92,15 +85,6 @@ void restart_peak_memory() {
 #endif
   std::ofstream("/proc/self/clear_refs") << '5';
 }
-
-void ErrorStatistics::add(double error) {
-  const double size = std::abs(error);
-  largest_ = size <= largest_ ? largest_ : size;
-  squares_ += error * error;
-  ++count_;
-}
-
-double ErrorStatistics::rms() const { return std::sqrt(squares_ / static_cast<double>(count_)); }
 
 Measurement share_of(const std::string& name, int count, std::size_t trials,
                      std::optional<Goal> goal) {
@@ -144,21 +128,21 @@ void Report::add(const Case& measured) {
   for (const Measurement& m : measured.measurements) {
     Json& of = record["measurements"].emplace_back(
         Json{{"name", m.name}, {"value", m.value}, {"unit", m.unit}});
-    std::string value = fmt::format("{:>10.4g} {}", m.value, m.unit);
+    std::string text = fmt::format("{:>10.4g} {}", m.value, m.unit);
     std::string goal;
     if (m.goal) {
-      const bool most = m.goal->kind == Goal::Kind::at_most;
-      of[most ? "at_most" : "at_least"] = m.goal->value;
-      of["reached"] = most ? m.value <= m.goal->value : m.value >= m.goal->value;
-      goal = fmt::format("{} {:.4g}", most ? "≤" : "≥", m.goal->value);
+      const auto [is_most, value] = *m.goal;
+      of[is_most ? "at_most" : "at_least"] = value;
+      of["reached"] = is_most ? m.value <= value : m.value >= value;
+      goal = fmt::format("{} {:.4g}", is_most ? "≤" : "≥", value);
     }
     if (m.interval) {
       of["low"] = m.interval->low;
       of["high"] = m.interval->high;
-      value += fmt::format(" ({:.4g} to {:.4g})", m.interval->low, m.interval->high);
+      text += fmt::format(" ({:.4g} to {:.4g})", m.interval->low, m.interval->high);
     }
     const char* reached = !m.goal ? "" : of["reached"] ? "yes" : "no";
-    fmt::print(fmt::runtime(row), measured.name, m.name, value, goal, reached);
+    fmt::print(fmt::runtime(row), measured.name, m.name, text, goal, reached);
   }
   std::fflush(stdout);
   document_["cases"].push_back(std::move(record));

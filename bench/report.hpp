@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -48,28 +49,30 @@ std::uint64_t peak_resident_bytes();
 void restart_peak_memory();
 
 /// Largest and root mean square of what was added.
-class ErrorStatistics {
- public:
-  /// Counts one error; one that is not a number makes the largest so, too.
-  void add(double error);
-  double largest() const { return largest_; }
-  double rms() const;
+struct ErrorStatistics {
+  double largest = 0.0;
+  double squares = 0.0;
+  std::uint64_t count = 0;
 
- private:
-  double largest_ = 0.0;
-  double squares_ = 0.0;
-  std::uint64_t count_ = 0;
+  /// Counts one error; one that is not a number makes the largest so, too.
+  void add(double error) {
+    const double size = std::abs(error);
+    largest = size <= largest ? largest : size;
+    squares += error * error;
+    ++count;
+  }
+  double rms() const { return std::sqrt(squares / static_cast<double>(count)); }
 };
 
 using Json = nlohmann::ordered_json;
 
 /// What a measured value is held against.
 struct Goal {
-  enum class Kind { at_most, at_least } kind = Kind::at_most;
+  bool is_most = true;  ///< else the least that is to be reached
   double value = 0.0;
 };
-inline Goal at_most(double value) { return {Goal::Kind::at_most, value}; }
-inline Goal at_least(double value) { return {Goal::Kind::at_least, value}; }
+inline Goal at_most(double value) { return {true, value}; }
+inline Goal at_least(double value) { return {false, value}; }
 
 struct Measurement {
   std::string name;
@@ -87,6 +90,10 @@ struct Case {
   std::string name;
   Json facts;
   std::vector<Measurement> measurements = {};
+
+  void add(const std::vector<Measurement>& more) {
+    measurements.insert(measurements.end(), more.begin(), more.end());
+  }
 };
 
 /// A run of a command: its device, and its results, which begin with the facts that explain them.

@@ -190,20 +190,6 @@ SCENARIOS = {
 }  # fmt: skip
 
 
-def learned_touches(scenario: Scenario, first_seed: int) -> list[palpate.Recording]:
-    """192 touches of each object at known poses; letters have the seeds of their places among all vowels."""
-    touching = scenario.touching
-    return [
-        palpate.simulate(
-            shape,
-            elements_mm=touching.elements_mm,
-            sensor=touching.sensor,
-            seed=first_seed + (VOWELS.index(shape) if shape in VOWELS else i),
-        )
-        for i, shape in enumerate(scenario.learned)
-    ]
-
-
 def trials_of(
     scenario: Scenario, each: int, each_stranger: int, later: int, folder: str
 ) -> tuple[list[palpate.Recording], list[palpate.Recording]]:

@@ -4,42 +4,23 @@ import argparse
 import math
 import time
 from collections.abc import Sequence
+from functools import partial
+
+import numpy
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 import palpate
 from palpate import _charts as charts
-from palpate._sweep_runs import counts_of
-from palpate._tables import (
-    Column,
-    Table,
-    count_text,
-    difference_text,
-    mean_text,
-    number,
-    plain,
-    print_table,
-    seconds_text,
-)
+from palpate._tables import Column, Table, count_text, mean_text, number, plain, seconds_text
 
 from .measures import differences, knee_of
 from .program import Json, begin, main, parser, write
-from .sweep_charts import charts_of
-from .sweep_runs import (
-    first_each,
-    measure_bounds,
-    measure_histogram,
-    measure_limits,
-    measure_particles,
-)
-from .trials import (
-    TABLE_1,
-    VOWELS,
-    Bins,
-    lattice_of,
-    letter_maps,
-    make_trials,
-    training_recordings,
-)
+from .sweep_runs import first_each, measure_bounds, measure_histogram, measure_limits, measure_particles
+from .trials import TABLE_1, VOWELS, Bins, Floats, lattice_of, letter_maps, make_trials, training_recordings
 
+EDGED: Json = {"markeredgecolor": "auto"}  # marks have their own colour around them
 SEED = 1_000  # the experiment's
 TOUCHES = 15
 #: The goal's lattice: balanced, about a million bins.
@@ -50,6 +31,7 @@ _MIB = number(".1f", 1.0 / (1 << 20))
 _MM = number(".3f")
 _NATS = number(".1e")
 _PERCENT = number(".0f", 100.0)
+_DIFFERENCE = partial(mean_text, sign="+")
 
 RUNS: list[Column] = [
     ("filter", "filter", plain),
@@ -97,8 +79,8 @@ LIMITS: list[Column] = [
     ("mode: mean error, mm", "error_mm", mean_text),
     ("refined: mean error, mm", "refined_error_mm", mean_text),
     ("compared with", "against", plain),
-    ("mode: difference, mm", "difference_mm", difference_text),
-    ("refined: difference, mm", "refined_difference_mm", difference_text),
+    ("mode: difference, mm", "difference_mm", _DIFFERENCE),
+    ("refined: difference, mm", "refined_difference_mm", _DIFFERENCE),
 ]
 
 
@@ -111,11 +93,11 @@ STEPS: list[Column] = [
     ("map cells, mm", "cell_mm", plain),
     ("from bins", "from", count_text),
     ("to bins", "to", count_text),
-    ("trials", "trials", plain),
+    ("trials", "error_mm/trials", plain),
     ("mode: mean error, mm", "error_mm", _step_text),
-    ("difference, mm", "error_mm", difference_text),
+    ("difference, mm", "error_mm", _DIFFERENCE),
     ("refined: mean error, mm", "refined_error_mm", _step_text),
-    ("difference, mm", "refined_error_mm", difference_text),
+    ("difference, mm", "refined_error_mm", _DIFFERENCE),
 ]
 VERDICTS: list[Column] = [
     ("goal", "name", plain),
@@ -140,13 +122,11 @@ def knee_record(points: Sequence[Json], cell_mm: float, fine: Bins) -> Json:
     bins, over the trials that both locate.
     """
     runs = [point for point in points if point["balanced"] and point["cell_mm"] == cell_mm]
-    knees = {}
-    for name in ("errors_mm", "refined_errors_mm"):
-        knee = knee_of([run[name] for run in runs])
-        knees[name] = None if knee is None else runs[knee]["count"]
+    finest, fine_count = runs[-1], math.prod(fine)
+    mode, refined = (knee_of([run[name] for run in runs]) for name in ("errors_mm", "refined_errors_mm"))
 
-    def text(count: int | None) -> str:
-        return f"at least {count_text(runs[-1]['count'])}" if count is None else count_text(count)
+    def text(knee: int | None) -> str:
+        return f"at least {count_text(finest['count'])}" if knee is None else count_text(runs[knee]["count"])
 
     steps = []
     for to in runs:
@@ -154,18 +134,13 @@ def knee_record(points: Sequence[Json], cell_mm: float, fine: Bins) -> Json:
             step: Json = {"cell_mm": cell_mm, "from": coarser["count"], "to": to["count"]}
             for name in ("error", "refined_error"):
                 step[f"{name}_mm"] = differences(to[f"{name}s_mm"], coarser[f"{name}s_mm"])
-            step["trials"] = step["error_mm"] and step["error_mm"]["trials"]
             steps.append(step)
     return {
         "cell_mm": cell_mm,
-        "balanced_bins": list(fine),
-        "balanced_count": math.prod(fine),
-        "mode_knee": knees["errors_mm"],
-        "refined_knee": knees["refined_errors_mm"],
-        "floor_mm": runs[-1]["refined_error_mm"],
-        "sentence": f"Maps with cells of {cell_mm:g} mm need {text(knees['errors_mm'])} bins for the mode "
-        f"and {text(knees['refined_errors_mm'])} for the refined pose; --bins fine takes {plain(fine)} = "
-        f"{count_text(math.prod(fine))}.",
+        "balanced_count": fine_count,
+        "floor_mm": finest["refined_error_mm"],
+        "sentence": f"Maps with cells of {cell_mm:g} mm need {text(mode)} bins for the mode and "
+        f"{text(refined)} for the refined pose; --bins fine takes {plain(fine)} = {count_text(fine_count)}.",
         "steps": steps,
     }
 
@@ -173,12 +148,13 @@ def knee_record(points: Sequence[Json], cell_mm: float, fine: Bins) -> Json:
 def bounds_sentence(points: Sequence[Json]) -> str:
     """How well bounds agree with the histogram."""
     compared = [point["by_bounds"] for point in points if point["by_bounds"]]
-    trials = sum(of["compared_trials"] for of in compared)
-    mode_mm = max((of["mode_difference_mm"] for of in compared), default=0.0)
-    refined_mm = max((of["refined_difference_mm"] for of in compared), default=0.0)
+    mode_mm, refined_mm = (
+        max((of[f"{kind}_difference_mm"] for of in compared), default=0.0) for kind in ("mode", "refined")
+    )
     return (
-        f"Of {trials} trials with the full posterior on the same lattices, modes lie within "
-        f"{mode_mm:.1e} mm of those by bounds, and refined poses within {refined_mm:.1e} mm."
+        f"Of {sum(of['compared_trials'] for of in compared)} trials with the full posterior on the same "
+        f"lattices, modes lie within {mode_mm:.1e} mm of those by bounds, and refined poses within "
+        f"{refined_mm:.1e} mm."
     )
 
 
@@ -235,17 +211,17 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> Json:
             some = first_each(trials, 1 if quick or math.prod(bins) > 1_200_000 else 4)
             bounds.append(measure_bounds(device, maps, some, bins))
         fine = palpate.balanced_lattice(lattice_of(GOAL_BINS), maps, "fine")
-        knees.append(knee_record(points, cell_mm, counts_of(fine)))
-    print_table(BOUNDS, bounds)
+        knees.append(knee_record(points, cell_mm, fine.shape[::-1]))
+    Table(BOUNDS, bounds)
     lattices = [scaled(1e4)] if quick else [GOAL_BINS, scaled(3e5), scaled(3e6)]
     each = min(len(trials) // len(VOWELS), 2 if quick else len(trials))
     limits = measure_limits(device, quick, lattices, each, TOUCHES, SEED)
-    print_table(LIMITS, limits)
+    Table(LIMITS, limits)
     print("", *(f"- {knee['sentence']}" for knee in knees), sep="\n")
-    print_table(STEPS, [step for knee in knees for step in knee["steps"]])
+    Table(STEPS, [step for knee in knees for step in knee["steps"]])
     agreement, verdicts = bounds_sentence(points), verdicts_of(points)
     print(f"\n{agreement}")
-    print_table(VERDICTS, verdicts)
+    Table(VERDICTS, verdicts)
     return {
         "touches": TOUCHES,
         "trials": len(trials),
@@ -256,6 +232,113 @@ def measure(device: palpate.Device, options: argparse.Namespace) -> Json:
         "limits": limits,
         "verdicts": verdicts,
     }
+
+
+def front_of(costs: Floats, errors: Floats) -> NDArray[numpy.intp]:
+    """Which are on the Pareto front of costs and errors, by rising cost; of equals the first."""
+    rising = numpy.lexsort((errors, costs))
+    least = numpy.minimum.accumulate(errors[rising])
+    return numpy.compress(numpy.diff(least, prepend=numpy.inf) < 0.0, rising)
+
+
+def pose_chart(document: Json) -> Axes:
+    """The front is over runs that recognise and locate all trials, as errors over some would flatter."""
+    x = f"time per unknown of {document['touches']} touches, an estimate after each"
+    axes = charts.chart(x, "mean pose error (mm)", xscale="log", yscale="log")
+    charts.ticks(axes.xaxis, seconds_text)
+    fills: dict[float, Json] = {0.25: {"alpha": 0.4}, 0.5: {}, 1.0: charts.HOLLOW}
+    best = []
+    for colour, (kind, of, name, mark, counted) in zip(
+        charts.COLOURS,
+        (
+            # The refined pose stands right below its mode, and particles by their like.
+            ("histogram", "error_mm", "histogram, mode", "o", False),
+            ("histogram", "refined_error_mm", "histogram, refined", "s", True),
+            ("particles", "error_mm", "particles", "^", True),
+            ("augmented", "error_mm", "Augmented MCL", "D", False),
+            ("systematic", "error_mm", "systematic resampling", "^", False),
+        ),
+        strict=False,
+    ):
+        for cell_mm, fill in fills.items():
+            points = [
+                point | {"seconds": point["seconds_per_unknown"] + refine_s}
+                for point in document["points"]
+                if (point["filter"], point["cell_mm"]) == (kind, cell_mm) and point[of]
+                for refine_s in [point["seconds_refine"] if of == "refined_error_mm" else 0.0]
+            ]
+            look: Json = {"linestyle": "", "marker": mark, "color": colour} | EDGED | fill
+            if points:
+                label = name if cell_mm == 0.5 else ""
+                charts.series(axes, points, "seconds", f"{of}/mean", label, **look)
+            for point in points:
+                place = point["seconds"], point[of]["mean"]
+                if counted and cell_mm == 0.5:
+                    text: Json = {"textcoords": "offset points", "fontsize": 8, "color": colour}
+                    axes.annotate(count_text(point["count"]), place, (6, 3), **text)
+                if point["accuracy"] == 1.0 and point[of]["trials"] == document["trials"]:
+                    best.append(place)
+    if best:
+        costs, errors = numpy.transpose(best)
+        front = front_of(costs, errors)
+        look = {"color": charts.GREY, "linestyle": "-", "marker": "", "zorder": 1}
+        axes.plot(costs[front], errors[front], label="Pareto front", **look)
+    return axes
+
+
+def knee_chart(document: Json) -> Axes:
+    """Errors over balanced bins, by colours for map cells."""
+    axes = charts.chart("bins per object", "mean pose error (mm)", xscale="log", yscale="log")
+    charts.ticks(axes.xaxis, count_text)
+    balanced = [point for point in document["points"] if point["balanced"]]
+    finest = max(point["count"] for point in balanced)
+    for colour, knee in zip(charts.COLOURS, document["knees"], strict=False):
+        cell_mm = knee["cell_mm"]
+        own = [point for point in balanced if point["cell_mm"] == cell_mm]
+        for path, label, look in (
+            ("error_mm/mean", f"{cell_mm:g} mm cells, mode", charts.SOLID),
+            ("refined_error_mm/mean", f"{cell_mm:g} mm, refined", charts.DASHED | {"linestyle": "-"}),
+        ):
+            charts.series(axes, own, "count", path, label, color=colour, **EDGED | look)
+        if knee["balanced_count"] <= 2.0 * finest:
+            charts.rule(axes, knee["balanced_count"], f"fine, {cell_mm:g} mm", vertical=True, colour=colour)
+        if cell_mm == 0.5:
+            look = {"color": charts.GREY, "linestyle": "--", "marker": ""}
+            charts.series(axes, own, "count", "nearest_bin_mm", "nearest bin", **look)
+    floors = [knee["floor_mm"] for knee in document["knees"] if knee["floor_mm"]]
+    for least in sorted(floors, key=lambda floor: float(floor["mean"]))[:1]:
+        charts.rule(axes, least["mean"], f"least error {mean_text(least)} mm, {least['trials']} trials")
+    return axes
+
+
+def bounds_chart(document: Json) -> Axes:
+    """Times of histogram and bounds over bins."""
+    y = f"time per unknown of {document['touches']} touches"
+    axes = charts.chart("bins in all", y, xscale="log", yscale="log")
+    charts.ticks(axes.xaxis, count_text)
+    charts.ticks(axes.yaxis, seconds_text)
+    for colour, kind, name in (
+        (charts.COLOURS[0], "histogram", "histogram"),
+        (charts.COLOURS[1], "bounded", "by bounds"),
+    ):
+        for asked, words, look in (
+            ("once", "asked once", charts.SOLID),
+            ("each_touch", "asked after each touch", charts.DASHED),
+        ):
+            look = EDGED | {"color": colour} | look
+            label = f"{name}, {words}"
+            charts.series(axes, document["bounds"], "bins_in_all", f"{kind}/{asked}", label, **look)
+    return axes
+
+
+def charts_of(document: Json) -> dict[str, Figure]:
+    """All charts, by the names of their files."""
+    drawn = {
+        "sweep_front": pose_chart(document),
+        "sweep_bins": knee_chart(document),
+        "sweep_bounds": bounds_chart(document),
+    }
+    return {name: charts.finished(axes) for name, axes in drawn.items()}
 
 
 def program() -> None:

@@ -10,29 +10,14 @@ import numpy
 
 import palpate
 from palpate import reference
-from palpate._statistics import Errors, errors_over, quantile
+from palpate._statistics import errors_over, quantile
 from palpate._tables import column, count_text
 
 from .certificates import check_certificate, dense_posterior
 from .measures import calibration, differences, wrapped
 from .program import Json
-from .trials import (
-    EXACT,
-    TABLE_1,
-    VOWELS,
-    Bins,
-    Body,
-    Floats,
-    Touching,
-    error_of,
-    lattice_of,
-    letter_maps,
-    make_trials,
-    map_of,
-    recognized,
-    training_recordings,
-    truth_of,
-)
+from .trials import EXACT, TABLE_1, VOWELS, Bins, Body, Floats, Touching, error_of, lattice_of, letter_maps
+from .trials import make_trials, map_of, recognized, training_recordings, truth_of
 
 Maps = Sequence[palpate.OccupancyGrid]
 Trials = Sequence[palpate.Recording]
@@ -57,45 +42,40 @@ def seconds_of(call: Callable[[], T]) -> tuple[float, T]:
 
 def asked_after(belief: Any, touches: palpate.Recording | palpate.Touch) -> tuple[float, Any]:
     """Seconds of taking in touches and of an estimate, and the estimate."""
-
-    def ask() -> Any:
-        belief.update(touches)
-        return belief.estimate()
-
-    return seconds_of(ask)
+    return seconds_of(lambda: (belief.update(touches), belief.estimate())[1])
 
 
 def follow(belief: Any, maps: Maps, trial: palpate.Recording) -> Json:
     """Asks a belief after each touch of a trial: times in s, what it says, its poses in the end."""
     truth, refined, refine_s = truth_of(trial), None, None
     touch_s, estimates = zip(*[asked_after(belief, touch) for touch in trial], strict=True)
-    best = [int(numpy.argmax(estimate.identity)) for estimate in estimates]
     mode = estimates[-1].mode
     if isinstance(belief, palpate.PoseHistogram):
         refine_s, refined = seconds_of(lambda: belief.refine(mode))
-    grid = maps[mode.object]
     return {
         "touch_s": touch_s,
         "refine_s": refine_s,
-        "confidence": [max(estimate.identity) for estimate in estimates],
-        "right": [maps[i].label == truth.object for i in best],
+        "confidence": [max(of.identity) for of in estimates],
+        "right": [maps[int(numpy.argmax(of.identity))].label == truth.object for of in estimates],
         "mode": mode,
         "refined": refined,
-        "error_mm": error_of(grid, truth, mode),
-        "refined_error_mm": error_of(grid, truth, refined),
+        "error_mm": error_of(maps[mode.object], truth, mode),
+        "refined_error_mm": error_of(maps[mode.object], truth, refined),
     }
 
 
 def record_of(
-    kind: str, maps: Maps, count: int, device_bytes: int, ends: Sequence[Json], steps: Sequence[Json]
+    kind: str, maps: Maps, belief: Any, ends: Sequence[Json], steps: Sequence[Json], off_nats: Sequence[float]
 ) -> Json:
-    """What a run cost, as medians, and how well it knows the objects, by follow(); its pose errors."""
+    """What a run cost, as medians, how well it knows the objects, by follow(), and its errors.
+
+    off_nats: how far log-likelihoods are from float64.
+    """
     touch_s, confidence, right = (column(ends, of) for of in ("touch_s", "confidence", "right"))
-    refine_s = column(ends, "refine_s")
+    refine_s, off = column(ends, "refine_s"), numpy.abs(off_nats)
     record: Json = {
         "filter": kind,
         "cell_mm": maps[0].cell_mm,
-        "count": count,
         "bins": None,
         "balanced": False,
         "trials": len(steps),
@@ -103,11 +83,16 @@ def record_of(
         "seconds_per_touch": quantile(touch_s, 0.5),
         "seconds_per_unknown": quantile(touch_s.sum(axis=1), 0.5),
         "seconds_refine": None if numpy.isnan(refine_s).any() else quantile(refine_s, 0.5),
-        "device_bytes": device_bytes,
+        "device_bytes": belief.device_bytes,
         "accuracy": float(right[:, -1].mean()),
         "expected_calibration_error": calibration(confidence.ravel(), right.ravel())["expected_error"],
         "by_bounds": None,
         "nearest_bin_mm": None,
+        "deviation_nats": {
+            "largest": float(off.max()),
+            "rms": float(numpy.sqrt(numpy.mean(off**2))),
+            "samples": len(off),
+        },
     }
     for name in ("error", "refined_error"):
         errors = [step.get(f"{name}_mm") for step in steps]
@@ -115,16 +100,7 @@ def record_of(
     return record
 
 
-def deviation_record(deviations: Sequence[float]) -> Json:
-    """How far log-likelihoods are from float64, in nats."""
-    off = numpy.abs(deviations)
-    rms = float(numpy.sqrt(numpy.mean(off**2)))
-    return {"largest": float(off.max()), "rms": rms, "samples": len(off)}
-
-
-def nearest_bin_mm(
-    lattice: palpate.PoseLattice, body: Body, pose: Floats
-) -> float:
+def nearest_bin_mm(lattice: palpate.PoseLattice, body: Body, pose: Floats) -> float:
     """Least error that a bin of the lattice has for a body at a pose: what the lattice alone costs.
 
     At a given theta the error grows with the distance between the places of the body's centroid, so that
@@ -151,9 +127,7 @@ def by_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bins) ->
     return [of_trial[-1] for of_trial in steps]
 
 
-def measure_histogram(
-    device: palpate.Device, maps: Maps, trials: Trials, full_each: int, bins: Bins
-) -> Json:
+def measure_histogram(device: palpate.Device, maps: Maps, trials: Trials, full_each: int, bins: Bins) -> Json:
     """What the histogram costs and what it is worth over the first `full_each` trials of every letter.
 
     Where these are not all, the errors are those of all trials by bounds.
@@ -176,60 +150,53 @@ def measure_histogram(
     belief.reset()
     belief.update(touch)
     contact, random = palpate.ContactModel(prior=maps[0].prior), numpy.random.default_rng(7)
-    deviations = []
+    off_nats = []
     for i, grid in enumerate(maps):
         logs = belief.log_likelihood(i).reshape(-1)
         for bin_ in random.integers(len(logs), size=SAMPLED).tolist():
             pose = lattice.T_object_robot(bin_)
-            expected = reference.log_likelihood(touch, pose, grid, contact)
-            deviations.append(float(logs[bin_]) - expected)
-    return record_of("histogram", maps, lattice.bins, belief.device_bytes, ends, steps) | {
+            off_nats.append(float(logs[bin_]) - reference.log_likelihood(touch, pose, grid, contact))
+    return record_of("histogram", maps, belief, ends, steps, off_nats) | {
+        "count": lattice.bins,
         "bins": list(bins),
         "balanced": bins not in TABLE_1,
         "by_bounds": compared,
         "nearest_bin_mm": float(numpy.mean(nearest_mm)),
-        "deviation_nats": deviation_record(deviations),
     }
 
 
 def comparison_of(maps: Maps, full: Trials, ends: Sequence[Json], records: Sequence[Json]) -> Json:
     """How far apart the poses of a trial lie at the most, by the histogram and by bounds."""
-    apart: dict[str, list[float]] = {"mode": [], "refined": []}
-    for trial, end, record in zip(full, ends, records, strict=True):
-        if end["error_mm"] is not None:
-            for kind, distances in apart.items():
-                pose = [record[kind][of] for of in ("x_mm", "y_mm", "theta_rad")]
-                grid = map_of(maps, trial)
-                distances.append(palpate.pose_error_mm(grid, end[kind].T_object_robot, pose))
-    return {
-        "compared_trials": len(apart["mode"]),
-        "mode_difference_mm": max(apart["mode"], default=0.0),
-        "refined_difference_mm": max(apart["refined"], default=0.0),
-    }
+    located = [of for of in zip(full, ends, records, strict=True) if of[1]["error_mm"] is not None]
+    compared: Json = {"compared_trials": len(located)}
+    for kind in ("mode", "refined"):
+        distances = [
+            palpate.pose_error_mm(
+                map_of(maps, trial),
+                end[kind].T_object_robot,
+                [record[kind][of] for of in ("x_mm", "y_mm", "theta_rad")],
+            )
+            for trial, end, record in located
+        ]
+        compared[f"{kind}_difference_mm"] = max(distances, default=0.0)
+    return compared
 
 
-def measure_particles(
-    device: palpate.Device, maps: Maps, trials: Trials, kind: str, particles: int
-) -> Json:
+def measure_particles(device: palpate.Device, maps: Maps, trials: Trials, kind: str, particles: int) -> Json:
     """What a particle filter costs and what it is worth over all trials; trial i has the seed 1 + i.
 
     kind: "particles", "systematic" or "augmented". Log-likelihoods after one touch are taken relative to
     the heaviest particle.
     """
 
-    resampling = palpate.Resampling["systematic" if kind == "systematic" else "multinomial"]
-
     def filter_of(seed: int) -> palpate.ParticleFilter:
         return palpate.ParticleFilter(
             device, maps, lattice_of((1, 1, 1)), seed=seed, particles=particles,
-            resampling=resampling, augmented=kind == "augmented",
+            augmented=kind == "augmented",
+            resampling=palpate.Resampling["systematic" if kind == "systematic" else "multinomial"],
         )  # fmt: skip
 
-    ends, most_bytes = [], 0
-    for seed, trial in enumerate(trials, start=1):
-        belief = filter_of(seed)
-        ends.append(follow(belief, maps, trial))
-        most_bytes = max(most_bytes, belief.device_bytes)
+    ends = [follow(filter_of(seed), maps, trial) for seed, trial in enumerate(trials, start=1)]
     touch, belief = trials[0][0], filter_of(len(trials) + 1)
     belief.update(touch)
     objects, poses, weights = belief.particles()
@@ -241,11 +208,8 @@ def measure_particles(
     heaviest = int(numpy.argmax(weights))
     expected = log_likelihood(heaviest)
     drawn = numpy.random.default_rng(7).integers(len(weights), size=SAMPLED * len(maps)).tolist()
-    deviations = [
-        math.log(weights[i] / weights[heaviest]) - (log_likelihood(i) - expected) for i in drawn
-    ]
-    record = record_of(kind, maps, particles, most_bytes, ends, ends)
-    return record | {"deviation_nats": deviation_record(deviations)}
+    off_nats = [math.log(weights[i] / weights[heaviest]) - (log_likelihood(i) - expected) for i in drawn]
+    return record_of(kind, maps, belief, ends, ends, off_nats) | {"count": particles}
 
 
 def measure_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bins) -> Json:
@@ -258,36 +222,29 @@ def measure_bounds(device: palpate.Device, maps: Maps, trials: Trials, bins: Bin
     bounded = palpate.BoundedPosterior(device, maps, lattice)
     histogram = palpate.PoseHistogram(device, maps, lattice)
     beliefs: dict[str, Any] = {"bounded": bounded, "histogram": histogram}
-    seconds: dict[str, dict[str, list[float]]] = {
-        name: {"once": [], "each_touch": []} for name in beliefs
-    }
-    checks, evaluated = [], []
     for belief in beliefs.values():
         asked_after(belief, trials[0])  # warms up
+    checks: list[Json] = []
     for trial in trials:
+        seconds: Json = {}
         for name, belief in beliefs.items():
             belief.reset()
-            seconds[name]["each_touch"].append(sum(asked_after(belief, touch)[0] for touch in trial))
+            each_touch = sum(asked_after(belief, touch)[0] for touch in trial)
             belief.reset()
-            seconds[name]["once"].append(asked_after(belief, trial)[0])
-        checks.append(check_certificate(bounded, dense_posterior(histogram, maps, trial)))
-        certificate = bounded.estimate().certificate
-        assert certificate is not None
-        evaluated.append(certificate.bins_evaluated)
+            seconds[name] = {"once": asked_after(belief, trial)[0], "each_touch": each_touch}
+        checks.append(seconds | check_certificate(bounded, dense_posterior(histogram, maps, trial)))
     times = {
-        name: {asked: quantile(of, 0.5) for asked, of in both.items()}
-        for name, both in seconds.items()
+        name: {asked: quantile(column(checks, f"{name}/{asked}"), 0.5) for asked in ("once", "each_touch")}
+        for name in beliefs
     }
-    in_all = lattice.bins * len(maps)
+    in_all, evaluated = lattice.bins * len(maps), quantile(column(checks, "bins_evaluated"), 0.5)
     return {
-        "cell_mm": maps[0].cell_mm,
         "count": lattice.bins,
-        "bins": list(bins),
         "bins_in_all": in_all,
         "trials": len(trials),
         **times,
-        "bins_evaluated": int(quantile(evaluated, 0.5)),
-        "share_evaluated": quantile(evaluated, 0.5) / in_all,
+        "bins_evaluated": int(evaluated),
+        "share_evaluated": evaluated / in_all,
         "certificate": max(check["promised"] for check in checks),
         "measured_error": max(check["measured"] for check in checks),
         "certificates_hold": sum(check["holds"] for check in checks),
@@ -342,34 +299,33 @@ def measure_limits(
     others, each compared with the same array on the first.
     """
     limits: list[Json] = []
-    unchanged: tuple[str, Errors, Errors] | None = None
+    names = ("error_mm", "refined_error_mm")
+    unchanged: Json | None = None
     for variant in VARIANTS[: 2 if quick else None]:
         poses = palpate.training_grid()
         if variant.more_training:
             poses = numpy.concatenate([poses, palpate.random_poses(7 * len(poses), 12)])
-        poses = poses[:: 3 if quick else 1]
-        training = training_recordings(replace(variant.touching, noise=(0.0, 0.0)), poses)
+        training = training_recordings(
+            replace(variant.touching, noise=(0.0, 0.0)), poses[:: 3 if quick else 1]
+        )
         maps = letter_maps(device, training, cell_mm=variant.cell_mm, spread_mm=variant.spread_mm)
         trials = make_trials(VOWELS, each, touches, seed, variant.touching)
         against = unchanged
         for bins in lattices if variant.all_lattices else lattices[:1]:
             records = by_bounds(device, maps, trials, bins)
-            modes, refined = (
-                [record.get(f"{name}_mm") for record in records] for name in ("error", "refined_error")
-            )
-            limits.append(
-                {
-                    "name": variant.name,
-                    "count": math.prod(bins),
-                    "elements": len(numpy.asarray(variant.touching.elements_mm)),
-                    "error_mm": errors_over(modes, 20),
-                    "refined_error_mm": errors_over(refined, 20),
-                    "against": against and against[0],
-                    "difference_mm": against and differences(modes, against[1]),
-                    "refined_difference_mm": against and differences(refined, against[2]),
-                }
-            )
-            unchanged = unchanged or (variant.name, modes, refined)
+            errors = {name: [record.get(name) for record in records] for name in names}
+            limit: Json = {
+                "name": variant.name,
+                "count": math.prod(bins),
+                "elements": len(numpy.asarray(variant.touching.elements_mm)),
+                "against": against and against["name"],
+            }
+            for name, of in errors.items():
+                limit[name] = errors_over(of, 20)
+                change = name.replace("error", "difference")
+                limit[change] = against and differences(of, against[name])
+            limits.append(limit)
+            unchanged = unchanged or {"name": variant.name, **errors}
             if bins == lattices[0]:
-                against = (f"{count_text(math.prod(bins))} bins", modes, refined)
+                against = {"name": f"{count_text(math.prod(bins))} bins", **errors}
     return limits

@@ -43,14 +43,21 @@ EXACT = Touching()
 
 
 def training_recordings(
-    touching: Touching = EXACT, poses: ArrayLike | None = None, *, first_seed: int = 1
+    touching: Touching = EXACT,
+    poses: ArrayLike | None = None,
+    *,
+    first_seed: int = 1,
+    shapes: Sequence[str] = VOWELS,
 ) -> list[palpate.Recording]:
-    """The vowels, touched at known poses T_object_sensor [n, 3], each with a seed of its own."""
+    """The shapes, touched at known poses T_object_sensor [n, 3], by default those of the training grid.
+
+    Letters have the seeds of their places among all vowels.
+    """
+    seeds = [VOWELS.index(shape) if shape in VOWELS else i for i, shape in enumerate(shapes)]
+    own: Json = {"elements_mm": touching.elements_mm, "sensor": touching.sensor}
     return [
-        palpate.simulate(
-            name, poses, elements_mm=touching.elements_mm, seed=seed, sensor=touching.sensor
-        )
-        for seed, name in enumerate(VOWELS, start=first_seed)
+        palpate.simulate(shape, poses, seed=first_seed + seed, **own)
+        for shape, seed in zip(shapes, seeds, strict=True)
     ]
 
 
@@ -94,9 +101,8 @@ def make_trials(
     trials = []
     for index, shape in enumerate(shapes):
         own = seed + index * SEEDS_PER_SHAPE
-        test_set = palpate.simulate(
-            shape, poses, elements_mm=touching.elements_mm, seed=own, sensor=touching.sensor
-        )
+        sensor, elements_mm = touching.sensor, touching.elements_mm
+        test_set = palpate.simulate(shape, poses, elements_mm=elements_mm, seed=own, sensor=sensor)
         trials += [_trial(test_set, touches, own + i, touching.noise) for i in range(each)]
     return trials
 
@@ -148,21 +154,17 @@ def recognized(
     maps: Sequence[palpate.OccupancyGrid],
     trials: Sequence[palpate.Recording],
     *,
-    extent_mm: float = 10.0,
     trace: bool = True,
     **options: Any,
 ) -> list[list[Json]]:
     """What is believed of every unknown after each of its touches, [trial][touch].
 
     Records as of `palpate recognize --trace`, and `confidence`, the probability of the best answer;
-    without `trace` that after the last touch alone, [trial][0]. The region is the extent about 0 along x
-    and y, and the full circle; options: those of palpate.recognize(), but that "(none)" has no weight
-    unless it is given one.
+    without `trace` that after the last touch alone, [trial][0]. The region is that of lattice_of();
+    options: those of palpate.recognize(), but that "(none)" has no weight unless it is given one.
     """
-    options = {"none": 0.0} | options
-    reach = (-extent_mm, extent_mm)
-    region: Json = {"x_mm": reach, "y_mm": reach, "pivot_mm": (0.0, 0.0)}
-    records = palpate.recognize(trials, maps, **region, trace=trace, device=device, **options)
+    region: Json = {"x_mm": (-10.0, 10.0), "y_mm": (-10.0, 10.0), "pivot_mm": (0.0, 0.0), "none": 0.0}
+    records = palpate.recognize(trials, maps, trace=trace, device=device, **region | options)
     steps = [record.get("trace", [record]) for record in records]
     for step in (step for of_trial in steps for step in of_trial):
         step["confidence"] = step["identity"][step["best"]]
@@ -185,9 +187,7 @@ class Body(NamedTuple):
         return Body(centroid_mm, inertia_mm2, grid.symmetry)
 
 
-def map_of(
-    maps: Sequence[palpate.OccupancyGrid], trial: palpate.Recording
-) -> palpate.OccupancyGrid:
+def map_of(maps: Sequence[palpate.OccupancyGrid], trial: palpate.Recording) -> palpate.OccupancyGrid:
     """The map of the letter that a trial is of."""
     return next(grid for grid in maps if grid.label == truth_of(trial).object)
 

@@ -14,11 +14,11 @@
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/text_table.hpp"
-#include "learning/calibration_task.hpp"
+#include "learning/sensor_calibration.hpp"
 #include "learning/table_learning.hpp"
 #include "model/option_words.hpp"
 #include "palpate/files.hpp"
-#include "recognition/object_fit.hpp"
+#include "recognition/label_probability.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate::cli {
@@ -67,23 +67,14 @@ std::string values_table(const SensorCalibration& calibration) {
   return table.text();
 }
 
-std::string scores_table(const std::string& title, const char* records, const Scores& before,
-                         const Scores& learned, const Scores& after) {
+std::string scores_table(const std::string& title, const char* records,
+                         const ComparedScores& scores) {
+  const auto& [before, learned, after] = scores;
   TextTable table({{title, false}, {"Eq. 7", true}, {"table", true}, {"table, tempered", true}});
   table.add({records, fmt::format("{}", before.records), fmt::format("{}", learned.records),
              fmt::format("{}", after.records)});
   add_score_rows(table, {&before, &learned, &after});
-  return table.text();
-}
-
-std::string scores_tables(const SensorCalibration& calibration) {
-  std::string text = scores_table("cross-validation", "touches", *calibration.before,
-                                  *calibration.table, *calibration.after);
-  if (const auto& groups = calibration.groups) {
-    text += "\n" + scores_table(fmt::format("{} touches together", groups->touches), "unknowns",
-                                groups->before, groups->table, groups->after);
-  }
-  return text;
+  return "\n" + table.text();
 }
 
 std::string kind_name(const TableKind& kind) {
@@ -96,8 +87,12 @@ std::string calibration_text(const SensorCalibration& calibration, std::size_t t
   std::string text = fmt::format("{} touches, {}\n\n", touches,
                                  count_of(calibration.objects, "object", "objects"));
   text += values_table(calibration);
-  if (calibration.before) {
-    text += "\n" + scores_tables(calibration);
+  if (calibration.touches) {
+    text += scores_table("cross-validation", "touches", *calibration.touches);
+  }
+  if (calibration.groups) {
+    text += scores_table(fmt::format("{} touches together", presses_in_group), "unknowns",
+                         *calibration.groups);
   }
   if (calibration.tried.size() > 1) {
     text += "tables tried, with their log-loss:";

@@ -128,6 +128,15 @@ void build_maps(const MapFlags& flags) {
   write_maps(flags, learned);
 }
 
+void make_maps(const MapFlags& flags) {
+  if (flags.of_drawings()) {
+    build_drawn_maps(flags);
+  } else {
+    require_no_drawing_flags(flags);
+    build_maps(flags);
+  }
+}
+
 }  // namespace
 
 void prepare_outputs(const MapFlags& flags, const std::vector<std::string>& names,
@@ -186,25 +195,13 @@ void write_maps(const MapFlags& flags, const LearnedMaps& learned) {
   }
 }
 
-namespace {
-
-void make_maps(const MapFlags& flags) {
-  if (flags.of_drawings()) {
-    build_drawn_maps(flags);
-  } else {
-    require_no_drawing_flags(flags);
-    build_maps(flags);
-  }
-}
-
-}  // namespace
-
 void add_map(CLI::App& app) {
   const auto [command, flags] =
       add_command<MapFlags>(app, "map",
                             "Build an object's occupancy grid from touches at known poses, with "
                             "--unposed from presses at unknown poses, or from a drawing",
                             make_maps);
+  flags->command = command;
   add_map_flags(*command, *flags);
   add_drawing_flags(*command, *flags);
 }

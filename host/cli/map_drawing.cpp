@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <utility>
 
@@ -11,31 +12,26 @@
 #include "cli/options.hpp"
 #include "io/drawing_file.hpp"
 #include "model/printable.hpp"
-#include "streaming/import_array.hpp"
+#include "streaming/import_steps.hpp"
 
 namespace palpate::cli {
 
 namespace {
 
 /// Throws Error where one of these flags is given.
-void require_none(std::initializer_list<std::pair<const char*, bool>> given, const char* why) {
-  for (const auto& [flag, is_given] : given) {
-    if (is_given) {
+void require_none(const MapFlags& flags, std::initializer_list<const char*> refused,
+                  const char* why) {
+  for (const char* flag : refused) {
+    if (flags.command->count(flag) > 0) {
       throw Error(Fault::input, fmt::format("{}: {}; leave it out", flag, why));
     }
   }
 }
 
 void check_flags(const MapFlags& flags) {
-  require_none({{"--threshold", flags.shared.threshold.has_value()},
-                {"--ratio", flags.shared.ratio.has_value()},
-                {"--sensor-model", !flags.shared.sensor_model.empty()},
-                {"--frames", flags.shared.frames.has_value()},
-                {"--touch-sd-mm", flags.shared.touch_sd_mm.has_value()},
-                {"--touch-sd-deg", flags.shared.touch_sd_deg.has_value()},
-                {"--group", !flags.group.empty()},
-                {"--unposed", flags.unposed},
-                {"--device", !flags.shared.device.empty()}},
+  require_none(flags,
+               {"--threshold", "--ratio", "--sensor-model", "--frames", "--touch-sd-mm",
+                "--touch-sd-deg", "--group", "--unposed", "--device"},
                "a drawing has no touches");
   for (const std::string& path : flags.recordings) {
     if (!is_drawing(path)) {
@@ -119,10 +115,7 @@ void add_drawing_flags(CLI::App& command, MapFlags& flags) {
 }
 
 void require_no_drawing_flags(const MapFlags& flags) {
-  require_none({{"--mm-per-pixel", flags.mm_per_pixel.has_value()},
-                {"--occupied", !flags.occupied.empty()},
-                {"--felt-share", flags.felt_share.has_value()},
-                {"--array", !flags.array.empty()}},
+  require_none(flags, {"--mm-per-pixel", "--occupied", "--felt-share", "--array"},
                "is of drawings alone");
 }
 

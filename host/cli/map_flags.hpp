@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "learning/map_request.hpp"
+#include "learning/map_task.hpp"
 
 namespace CLI {
 class App;
@@ -14,6 +14,7 @@ namespace palpate::cli {
 
 /// The flags of `palpate map`.
 struct MapFlags : MapRequest {
+  const CLI::App* command = nullptr;    ///< whose flags these are
   std::vector<std::string> recordings;  ///< or drawings
   std::optional<double> mm_per_pixel;
   std::string occupied;

@@ -248,9 +248,8 @@ void CommandStream::run_recorded() {
 double CommandStream::execute() {
   const VkDevice device = context_.device();
   const VkFence fence = fence_.get();
-  // No message is made, which would allocate memory, while all goes well.
   const auto require = [this](VkResult result) {
-    if (result != VK_SUCCESS) {
+    if (result != VK_SUCCESS) {  // no message is made while all goes well
       check(result, fmt::format("running on device '{}'", context_.name()));
     }
   };

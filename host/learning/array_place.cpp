@@ -30,17 +30,6 @@ namespace palpate {
 
 namespace {
 
-/// The elements as an array at this pose in their frame has them, scaled about its middle.
-std::vector<glm::dvec2> placed(std::span<const glm::dvec2> elements_mm, const Pose& offset,
-                               double scale = 1.0) {
-  const glm::dvec2 middle = array_centre_mm(elements_mm);
-  std::vector<glm::dvec2> result;
-  for (const glm::dvec2& p : elements_mm) {
-    result.push_back(offset * (middle + scale * (p - middle)));
-  }
-  return result;
-}
-
 /// Where the array sits in the tool, as "array_offset": by a pattern search, refined by a parabola
 /// through the neighbours of the best place, whose curvature gives the standard deviations. None
 /// where it sits where its elements are said to be, for all that the touches tell.
@@ -50,38 +39,23 @@ std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& 
   using Place = std::array<double, 3>;
   const auto pose_of = [](const Place& at) { return Pose{{at[0], at[1]}, at[2]}; };
   std::map<Place, double> known;
-  const auto judged = [&](const Place& at) {
-    const auto [entry, is_new] = known.try_emplace(at);
+  const auto judged = [&](const Pose& at) {
+    const auto [entry, is_new] =
+        known.try_emplace({at.translation_mm.x, at.translation_mm.y, at.theta_rad});
     if (is_new) {
-      entry->second = nats(pose_of(at));
+      entry->second = nats(at);
     }
     return entry->second;
   };
-  constexpr Place finest{0.125, 0.125, 0.0125};
-  double step = 8.0;  // in units of the finest
-  const auto neighbours_of = [&](const Place& place) {
-    std::vector<Place> neighbours;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (const double side : {-1.0, 1.0}) {
-        neighbours.push_back(place);
-        neighbours.back()[axis] += side * step * finest[axis];
-      }
-    }
-    return neighbours;
-  };
-  const Place from{start.translation_mm.x, start.translation_mm.y, start.theta_rad};
-  Summit<Place> found{from, judged(from)};
-  for (; step >= 1.0; step /= 2.0) {
-    found = climb(found, neighbours_of, judged);
-  }
+  const auto& [found, top] = climb_poses({start, judged(start)}, {{1.0, 1.0}, 0.1}, 4, judged);
+  const Place best{found.translation_mm.x, found.translation_mm.y, found.theta_rad};
   // The likelihood near its maximum as a parabola, in units of twice the finest steps.
-  const Place best = found.place;
-  const double top = found.value;
+  constexpr Place unit{0.25, 0.25, 0.025};
   const auto near = [&](std::size_t a, double da, std::size_t b, double db) {
     Place at = best;
-    at[a] += da * 2.0 * finest[a];
-    at[b] += db * 2.0 * finest[b];
-    return judged(at);
+    at[a] += da * unit[a];
+    at[b] += db * unit[b];
+    return judged(pose_of(at));
   };
   glm::dvec3 slope;
   glm::dmat3 information;
@@ -101,11 +75,11 @@ std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& 
   std::array<double, 3> sd{};
   double excess = 0.0;  // of the largest part in standard deviations
   for (int a = 0; a < 3; ++a) {
-    offset[a] += 2.0 * finest[a] * peak[a];
-    sd[a] = 2.0 * finest[a] * std::sqrt(std::max(covariance[a][a], 1e-4));
-    excess = std::max(excess, std::abs(offset[a]) / std::max(sd[a], finest[a] / 2.0));
+    offset[a] += unit[a] * peak[a];
+    sd[a] = unit[a] * std::sqrt(std::max(covariance[a][a], 1e-4));
+    excess = std::max(excess, std::abs(offset[a]) / std::max(sd[a], unit[a] / 4.0));
   }
-  const double gain = std::max(judged(offset), top) - judged({});
+  const double gain = std::max(judged(pose_of(offset)), top) - judged({});
   constexpr double least_excess = 3.0;
   if (!(gain > least_nats && excess > least_excess)) {
     return {};
@@ -172,10 +146,9 @@ bool turns_into(std::span<const glm::dvec2> a, std::span<const glm::dvec2> b) {
   constexpr double same_mm = 1e-6;
   const glm::dvec2 middle = array_centre_mm(a);
   for (int quarter = 0; quarter < 4; ++quarter) {
-    const Pose turn{{}, quarter * std::numbers::pi / 2.0};
-    const auto turned = [&](const glm::dvec2& p) { return middle + turn * (p - middle); };
+    const Pose turn = Pose{middle, quarter * std::numbers::pi / 2.0} * Pose{-middle, 0.0};
     if (std::ranges::equal(
-            a, b, [&](auto& p, auto& q) { return glm::distance(turned(p), q) < same_mm; })) {
+            a, b, [&](auto& p, auto& q) { return glm::distance(turn * p, q) < same_mm; })) {
       return true;
     }
   }
@@ -184,7 +157,8 @@ bool turns_into(std::span<const glm::dvec2> a, std::span<const glm::dvec2> b) {
 
 }  // namespace
 
-double likeness_of_angles(const SetupJudge& judge, double rad) {
+bool at_one_angle(const SetupJudge& judge, double rad) {
+  constexpr double least_likeness = 0.97;  // length of the mean of unit vectors at the angles
   std::complex<double> sum;
   double count = 0.0;
   for (const auto& [object, touches] : judge.touches()) {
@@ -193,7 +167,7 @@ double likeness_of_angles(const SetupJudge& judge, double rad) {
       ++count;
     }
   }
-  return std::abs(sum) / count;
+  return std::abs(sum) > least_likeness * count;
 }
 
 std::optional<SetupFinding> offset_on_drawings(const std::vector<Press>& presses,
@@ -242,56 +216,58 @@ std::vector<Press> with_offset(std::vector<Press> presses, const Pose& offset) {
   return presses;
 }
 
-void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check,
-                  const Pose& start) {
-  if (likeness_of_angles(judge, setup.rad) > one_angle) {
-    check.remarks.emplace_back(
+void check_offset(SetupSearch& search) {
+  if (at_one_angle(search.judge, search.setup.rad)) {
+    search.check.remarks.emplace_back(
         "all touches are at nearly one angle of the sensor, which tells nothing of where the array "
         "sits in the tool: turn the sensor between the touches, by 90 degrees or so");
     return;
   }
-  const auto setup_at = [&](const Pose& offset) {
-    Setup other = setup;
-    other.elements_mm = placed(setup.elements_mm, offset);
-    return other;
+  const auto nats_at = [&](const Pose& mount) {
+    Setup other = search.setup;
+    other.mount = mount;
+    return search.judge.nats(other);
   };
   // Gains that differ from one side of the array to the other move the edges that it feels as much.
   constexpr double least_moved_mm = 0.3;
-  const auto finding =
-      offset_of([&](const Pose& offset) { return judge.nats(setup_at(offset)); }, start);
-  if (finding && moved_mm(setup.elements_mm, *finding->array_offset) > least_moved_mm) {
-    check.findings.push_back(*finding);
-    setup = setup_at(*finding->array_offset);
-    nats = judge.nats(setup);
+  const auto finding = offset_of(nats_at, search.setup.mount);
+  search.setup.mount = {};
+  if (finding && moved_mm(search.setup.elements_mm, *finding->array_offset) > least_moved_mm) {
+    search.check.findings.push_back(*finding);
+    search.setup.mount = *finding->array_offset;
   }
+  search.nats = nats_at(search.setup.mount);
 }
 
-void check_pitch(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check) {
+void check_pitch(SetupSearch& search) {
+  const glm::dvec2 middle = array_centre_mm(search.setup.elements_mm);
   const auto scaled = [&](double scale) {
-    Setup other = setup;
-    other.elements_mm = placed(setup.elements_mm, {}, scale);
+    Setup other = search.setup;
+    for (glm::dvec2& p : other.elements_mm) {
+      p = middle + scale * (p - middle);
+    }
     return other;
   };
-  Summit<double> found{1.0, nats};
+  Summit<double> found{1.0, search.nats};
   for (double step = 0.08; step >= 0.01; step /= 2.0) {
     found = climb(
         found,
         [&](double scale) {
           return std::array{scale * (1.0 - step), scale * (1.0 + step)};
         },
-        [&](double scale) { return judge.nats(scaled(scale)); });
+        [&](double scale) { return search.judge.nats(scaled(scale)); });
   }
-  const auto& [best, best_nats] = found;
+  const auto& [best, nats] = found;
   // Touches at the places of a grid alone seem to be 3 % off.
   constexpr double least_change = 0.04;
-  if (best_nats - nats > least_nats && std::abs(best - 1.0) > least_change) {
-    check.findings.push_back(
-        {"pitch", best_nats - nats,
+  if (nats - search.nats > least_nats && std::abs(best - 1.0) > least_change) {
+    search.check.findings.push_back(
+        {"pitch", nats - search.nats,
          fmt::format("the elements lie {:.2f} times as far apart as they are said to: correct the "
                      "pitch in `array`, or import with the corrected array",
                      best)});
-    setup = scaled(best);
-    nats = best_nats;
+    search.setup = scaled(best);
+    search.nats = nats;
   }
 }
 
@@ -307,36 +283,35 @@ std::vector<ElementOrder> orders_but_for_turns(std::span<const glm::dvec2> eleme
   return kept;
 }
 
-SetupFinding order_finding(const std::vector<std::string>& options, double nats) {
-  return {"element_order", nats,
-          fmt::format("the elements are read in another order: import with `{}`",
-                      fmt::join(options, "` and `")),
-          options};
-}
-
-void check_order(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check) {
-  const auto orders = orders_of(setup.elements_mm);
+void check_order(SetupSearch& search) {
+  const auto orders = orders_of(search.setup.elements_mm);
   if (orders.empty()) {
-    check.remarks.emplace_back("the array is no grid: the order of its elements was not tried");
+    search.check.remarks.emplace_back(
+        "the array is no grid: the order of its elements was not tried");
     return;
   }
-  double best = nats;
-  ElementOrder found;
+  double best = search.nats;
+  const ElementOrder* found = nullptr;
   for (const ElementOrder& order : orders) {
-    Setup other = setup;
+    Setup other = search.setup;
     other.elements_mm = order.elements_mm;
-    const double tried = order.elements_mm == setup.elements_mm ? nats : judge.nats(other);
-    if (tried > best) {
-      best = tried;
-      found = order;
+    const double nats = search.judge.nats(other);
+    if (nats > best) {
+      best = nats;
+      found = &order;
     }
   }
   // Where touches overlap little, how the elements lie among the cells tells orders apart by a
   // little; a wrong order costs a good part of all that the touches tell.
-  if (best - nats > std::max(least_nats, least_share * std::abs(nats))) {
-    check.findings.push_back(order_finding(found.options, best - nats));
-    setup.elements_mm = found.elements_mm;
-    nats = best;
+  const double gain = best - search.nats;
+  if (found != nullptr && gain > std::max(least_nats, least_share * std::abs(search.nats))) {
+    search.check.findings.push_back(
+        {"element_order", gain,
+         fmt::format("the elements are read in another order: import with `{}`",
+                     fmt::join(found->options, "` and `")),
+         found->options});
+    search.setup.elements_mm = found->elements_mm;
+    search.nats = best;
   }
 }
 

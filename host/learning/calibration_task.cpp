@@ -1,4 +1,4 @@
-#include "learning/calibration_task.hpp"
+#include "learning/sensor_calibration.hpp"
 
 #include <algorithm>
 
@@ -6,7 +6,7 @@
 
 #include "io/input_file.hpp"
 #include "options/option.hpp"
-#include "palpate/object_frame.hpp"
+#include "palpate/occupancy_grid.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate {
@@ -81,24 +81,21 @@ void check_numbers(const CalibrationRequest& request, const Request& recognition
 /// unknown poses, and at known ones, on drawn maps, by as many levels as mean pressures.
 std::vector<TableKind> tables_of(const CalibrationRequest& request, bool known_poses,
                                  std::span<const OccupancyGrid> maps) {
+  std::vector<TableKind> tables = default_tables(false);
+  for (TableKind& kind : tables) {
+    kind.levels = request.levels ? static_cast<std::size_t>(*request.levels) : kind.levels;
+  }
+  const TableKind& of_contact = tables.front();
+  const TableKind& of_pressure = tables.back();
   const bool has_mean_levels =
       std::ranges::none_of(maps, [](const OccupancyGrid& map) { return map.mean_level.empty(); });
-  if (request.layer == "auto" && known_poses && !has_mean_levels) {
-    const std::size_t usual = default_tables(true).front().levels;
-    return {{MapLayer::log_odds,
-             static_cast<std::size_t>(request.levels.value_or(static_cast<int>(usual)))}};
+  if (request.layer == "auto" && has_mean_levels) {
+    return known_poses ? std::vector{of_pressure} : tables;
   }
-  std::vector<TableKind> tables;
-  for (TableKind kind : default_tables(false)) {
-    const bool of_pressure = kind.layer == MapLayer::mean_level;
-    const bool tried = request.layer == "auto" ? (of_pressure ? has_mean_levels : !known_poses)
-                                               : of_pressure == (request.layer == "mean_level");
-    if (tried) {
-      kind.levels = request.levels ? static_cast<std::size_t>(*request.levels) : kind.levels;
-      tables.push_back(kind);
-    }
+  if (request.layer == "auto" && known_poses) {
+    return {{MapLayer::log_odds, of_pressure.levels}};
   }
-  return tables;
+  return {request.layer == "mean_level" ? of_pressure : of_contact};
 }
 
 }  // namespace

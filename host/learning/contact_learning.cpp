@@ -87,21 +87,6 @@ double learned_threshold(const std::vector<Press>& presses) {
   return std::exp(otsu_threshold(logs));
 }
 
-/// Pressures of all elements In Contact, ascending.
-std::vector<double> contact_pressures(std::span<const Touch> touches,
-                                      std::span<const TouchEvidence> evidence) {
-  std::vector<double> pressures;
-  for (std::size_t i = 0; i < touches.size(); ++i) {
-    for (std::size_t e = 0; e < touches[i].pressure.size(); ++e) {
-      if (is_contact(evidence[i].readings[e])) {
-        pressures.push_back(touches[i].pressure[e]);
-      }
-    }
-  }
-  std::ranges::sort(pressures);
-  return pressures;
-}
-
 constexpr double least_sd = 0.05;  ///< least deviation of a logarithm, 5 % of the feature
 constexpr double pseudo_presses = 4.0;
 /// The largest correlation. Numbers rounded in a file still make a distribution below it.
@@ -163,13 +148,18 @@ LearnedReadings learn_readings(const std::vector<Press>& presses, const ReadingO
         std::max(readings.classifier.threshold, noise_sd * readings.noise);
   }
   readings.classifier.validate();
-  std::vector<Touch> touches;
+  std::vector<TouchEvidence> evidence;
   for (const Press& press : presses) {
-    touches.insert(touches.end(), press.touches.begin(), press.touches.end());
+    for (const Touch& touch : press.touches) {
+      evidence.emplace_back(touch, ContactModel{.classifier = readings.classifier});
+      for (std::size_t e = 0; e < touch.pressure.size(); ++e) {
+        if (is_contact(evidence.back().readings[e])) {
+          readings.pressures.push_back(touch.pressure[e]);
+        }
+      }
+    }
   }
-  const std::vector<TouchEvidence> evidence =
-      evidence_of(touches, {.classifier = readings.classifier});
-  readings.pressures = contact_pressures(touches, evidence);
+  std::ranges::sort(readings.pressures);
   if (readings.pressures.empty()) {
     throw Error(Fault::input,
                 fmt::format("no pressure is above the contact threshold, {:g} {}; give a lower "
@@ -247,9 +237,9 @@ double share_in_contact(std::span<const TouchEvidence> touches) {
 LearnedFeatures learn_features(std::span<const LabelledFeatures> presses) {
   Scatter all;
   std::map<std::string, Scatter> objects;
-  for (const LabelledFeatures& press : presses) {
-    all.add(press.features);
-    objects[press.label].add(press.features);
+  for (const auto& [label, features] : presses) {
+    all.add(features);
+    objects[label].add(features);
   }
   const glm::dmat3 of_all = all.products / std::max(1.0, all.n - 1.0);
   const double freedoms = all.n - static_cast<double>(objects.size());

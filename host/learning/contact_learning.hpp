@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "learning/press.hpp"
@@ -65,11 +66,8 @@ double noise_floor(const std::vector<Press>& presses, const ContactClassifier& c
 /// the area that touches sensed.
 double share_in_contact(std::span<const TouchEvidence> touches);
 
-/// The features of a press of an object.
-struct LabelledFeatures {
-  std::string label;
-  PressFeatures features;
-};
+/// The features of a press of an object, after its label.
+using LabelledFeatures = std::pair<std::string, PressFeatures>;
 
 /// The distribution of each object's features. An object's covariance is drawn towards that of all
 /// presses about the means of their objects, as if four presses more had varied so:

@@ -16,7 +16,7 @@
 #include "learning/progress.hpp"
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
-#include "recognition/object_fit.hpp"
+#include "recognition/label_probability.hpp"
 
 namespace palpate {
 
@@ -68,8 +68,7 @@ class FoldTrial {
     }
   }
 
-  CrossValidation run(std::size_t fold, const std::vector<Press>& presses,
-                      const std::function<void(double)>& progress) const {
+  CrossValidation run(std::size_t fold, const std::vector<Press>& presses) const {
     const std::vector<std::size_t> fold_of = folds_of(presses, settings_.folds);
     std::vector<Press> tried;
     for (std::size_t i = 0; i < presses.size(); ++i) {
@@ -79,14 +78,12 @@ class FoldTrial {
       }
     }
     const std::vector<Trial> trials = trials_of(tried, settings_.bins, fold);
-    const ContactModel classifier = model_.table
-                                        ? contact_with(model_.learning.contact, *model_.table, "")
-                                        : model_.learning.contact;
+    const ContactModel classifier = contact_for("");
     std::vector<std::vector<TouchEvidence>> evidence;
     for (const Trial& trial : trials) {
       evidence.push_back(evidence_of(trial.press.touches, classifier));
     }
-    const auto scores = score(evidence, progress);
+    const auto scores = score(evidence);
     CrossValidation result;
     for (std::size_t i = 0; i < trials.size(); ++i) {
       HeldOut held_out{.fold = fold, .half = trials[i].half, .log_evidence = {}};
@@ -109,8 +106,9 @@ class FoldTrial {
     return static_cast<std::size_t>(at - labels_.begin());
   }
 
-  ContactModel contact_for(std::size_t label) const {
-    return model_.table ? contact_with(model_.learning.contact, *model_.table, labels_[label])
+  /// With the numbers of all objects together where the label has none of its own.
+  ContactModel contact_for(const std::string& label) const {
+    return model_.table ? contact_with(model_.learning.contact, *model_.table, label)
                         : model_.learning.contact;
   }
 
@@ -120,20 +118,18 @@ class FoldTrial {
   }
 
   /// The scores of presses, [press][label].
-  std::vector<std::vector<LabelScore>> score(const std::vector<std::vector<TouchEvidence>>& presses,
-                                             const std::function<void(double)>& progress) const {
+  std::vector<std::vector<LabelScore>> score(
+      const std::vector<std::vector<TouchEvidence>>& presses) const {
     std::vector<std::vector<LabelScore>> scores(presses.size(),
                                                 std::vector<LabelScore>(labels_.size()));
-    Progress counter(static_cast<double>(labels_.size()), progress);
     tbb::parallel_for(std::size_t{0}, labels_.size(), [&](std::size_t label) {
-      const ContactModel contact = contact_for(label);
+      const ContactModel contact = contact_for(labels_[label]);
       for (const std::size_t map : maps_of_[label]) {
         PressPlacer placer = placer_on(map, contact);
         for (std::size_t i = 0; i < presses.size(); ++i) {
           scores[i][label].add(map, placer.place(presses[i]));
         }
       }
-      counter.add();
     });
     return scores;
   }
@@ -170,7 +166,7 @@ class FoldTrial {
     constexpr int most_rounds = 6;
     constexpr double enough = 0.6;  // of a step: a standard deviation that the steps resolve
     const std::size_t map = maps_of_[label].front();
-    const PressPlacer placer = placer_on(map, contact_for(label));
+    const PressPlacer placer = placer_on(map, contact_for(labels_[label]));
     // The first window is wide: one that ended near the truth would draw beliefs to it.
     const double spacing_mm = settings_.readings.spacing_mm;
     glm::dvec3 step{0.3 * spacing_mm, 0.3 * spacing_mm, 0.06};
@@ -219,7 +215,7 @@ class FoldTrial {
         labels, {}, [&](std::size_t one) { return scores[one].best_log_likelihood; });
     const LabelScore& at = scores[label];
     return best_fit_near(press, at.best_pose, hypotheses_[at.best_map].compared(),
-                         contact_for(label), 0);
+                         contact_for(labels_[label]), 0);
   }
 
   /// The labels but one that have maps.
@@ -240,7 +236,7 @@ class FoldTrial {
                             const std::optional<Pose>& T_object_robot) const {
     if (T_object_robot) {
       return evidence_fit(press, *T_object_robot, hypotheses_[scores[truth].best_map].compared(),
-                          contact_for(truth), {}, 0);
+                          contact_for(labels_[truth]), {}, 0);
     }
     std::vector<std::size_t> labels = others_of(truth, scores);
     labels.insert(labels.begin(), truth);  // the best where another is as good
@@ -264,7 +260,7 @@ class FoldTrial {
   std::vector<PlaceError> errors_of(const std::vector<Press>& presses) const {
     std::vector<PlaceError> errors;
     for (std::size_t label = 0; label < labels_.size(); ++label) {
-      const ContactModel contact = contact_for(label);
+      const ContactModel contact = contact_for(labels_[label]);
       std::map<std::string, std::vector<TouchEvidence>> of_group;
       for (const Press& press : presses) {
         TouchEvidence touch(press.touches.front(), contact);
@@ -275,7 +271,7 @@ class FoldTrial {
       }
       // Touches of several groups together would hide by how much each is off.
       for (const auto& [group, touches] : of_group) {
-        std::ranges::move(place_errors(touches, hypotheses_[maps_of_[label].front()], contact, 0),
+        std::ranges::move(place_errors(touches, hypotheses_[maps_of_[label].front()], contact),
                           std::back_inserter(errors));
       }
     }
@@ -389,9 +385,8 @@ CrossValidation& CrossValidation::operator+=(const CrossValidation& fold) {
 
 CrossValidation try_fold(std::size_t fold, const std::vector<Press>& presses,
                          const std::vector<std::string>& labels, const FoldModel& model,
-                         const CalibrationSettings& settings,
-                         const std::function<void(double)>& progress) {
-  return FoldTrial(labels, model, settings).run(fold, presses, progress);
+                         const CalibrationSettings& settings) {
+  return FoldTrial(labels, model, settings).run(fold, presses);
 }
 
 }  // namespace palpate

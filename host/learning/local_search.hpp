@@ -5,9 +5,12 @@
 #include <limits>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
+
+#include "palpate/pose.hpp"
 
 namespace palpate {
 
@@ -57,6 +60,27 @@ Summit<Place> climb(Summit<Place> from, const Neighbours& neighbours_of, const F
         better = true;
       }
     }
+  }
+  return from;
+}
+
+/// climb() over poses by steps along x, y and theta, which are halved from level to level.
+template <typename Function>
+Summit<Pose> climb_poses(Summit<Pose> from, Pose step, int levels, const Function& value_of) {
+  const auto neighbours_of = [&](const Pose& at) {
+    std::vector<Pose> moved;
+    for (const double sign : {-1.0, 1.0}) {
+      const Pose move{sign * step.translation_mm, sign * step.theta_rad};
+      const glm::dvec2& at_mm = at.translation_mm;
+      moved.push_back({{at_mm.x + move.translation_mm.x, at_mm.y}, at.theta_rad});
+      moved.push_back({{at_mm.x, at_mm.y + move.translation_mm.y}, at.theta_rad});
+      moved.push_back({at_mm, at.theta_rad + move.theta_rad});
+    }
+    return moved;
+  };
+  for (int level = 0; level < levels; ++level) {
+    from = climb(from, neighbours_of, value_of);
+    step = {step.translation_mm / 2.0, step.theta_rad / 2.0};
   }
   return from;
 }

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "io/input_file.hpp"
-#include "learning/calibration_task.hpp"
+#include "learning/sensor_calibration.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recognition/recordings.hpp"
@@ -24,11 +24,9 @@ constexpr std::size_t least_touches = 15;
 /// Presses at unknown poses that it takes, of each of two objects: two in each part left out.
 constexpr std::size_t least_presses = 10;
 
-/// A map of the folder and its file.
-struct FolderMap {
-  std::filesystem::path file;
-  OccupancyGrid map;
-};
+/// Maps of the folder by their files: what is learned does not depend on the order in which objects
+/// join the folder.
+using FolderMaps = std::map<std::filesystem::path, OccupancyGrid>;
 
 /// The maps in the folder but for those that are written anew.
 std::vector<std::filesystem::path> other_maps(const MapRequest& request,
@@ -49,15 +47,14 @@ std::vector<std::filesystem::path> other_maps(const MapRequest& request,
 
 /// The maps of the folder as they will be. Throws Error where a map that stays does not tell what
 /// learning needs.
-std::vector<FolderMap> folder_maps(const MapTask& task, const LearnedMaps& learned) {
+FolderMaps folder_maps(const MapTask& task, const LearnedMaps& learned) {
   const MapRequest& request = task.request;
-  std::vector<FolderMap> all;
+  FolderMaps all;
   for (const auto& [name, map] : learned.maps) {
-    all.push_back({request.map_file(name), map});
+    all.emplace(request.map_file(name).lexically_normal(), map);
   }
   for (const std::filesystem::path& file : other_maps(request, task.names())) {
-    all.push_back({file, read_map(file)});
-    const OccupancyGrid& map = all.back().map;
+    const OccupancyGrid& map = all.emplace(file.lexically_normal(), read_map(file)).first->second;
     if (!map.source || map.mean_level.empty()) {
       refuse(file, "holds no {}; build it anew from its recordings with palpate map -o {}",
              map.source ? "mean pressures" : "touches at known poses", request.output);
@@ -68,13 +65,11 @@ std::vector<FolderMap> folder_maps(const MapTask& task, const LearnedMaps& learn
              task.recordings.front().pressure_unit);
     }
   }
-  // What is learned does not depend on the order in which objects join the folder.
-  std::ranges::sort(all, {}, [](const FolderMap& map) { return map.file.filename(); });
   return all;
 }
 
 /// The touches of the maps, in the frames of these.
-std::vector<Recording> touches_of(const std::vector<FolderMap>& maps) {
+std::vector<Recording> touches_of(const FolderMaps& maps) {
   std::vector<Recording> touches;
   for (const auto& [file, map] : maps) {
     Recording& own = touches.emplace_back(map.source->touches);
@@ -88,7 +83,7 @@ std::vector<Recording> touches_of(const std::vector<FolderMap>& maps) {
 }
 
 /// Gives presses, of all touches of the maps in turn, the groups that the maps know.
-void give_groups(const std::vector<FolderMap>& maps, std::vector<Press>& presses) {
+void give_groups(const FolderMaps& maps, std::vector<Press>& presses) {
   auto press = presses.begin();
   for (const auto& [file, map] : maps) {
     const std::vector<std::string>& groups = map.source->groups;
@@ -163,7 +158,6 @@ void learn_from(const CalibrationTask& task, const MapRequest& request, LearnedM
 /// Runs `learn`, or says why no sensor can be learned. Where none is, one of other maps goes.
 template <typename Learn>
 void or_say_why_not(const MapRequest& request, LearnedMaps& learned, const Learn& learn) {
-  const auto before = learned.words.size();
   try {
     learn();
   } catch (const Error& error) {
@@ -175,62 +169,52 @@ void or_say_why_not(const MapRequest& request, LearnedMaps& learned, const Learn
   std::error_code ignored;
   if (!learned.sensor && !request.output.empty() &&
       std::filesystem::exists(request.sensor_file(), ignored)) {
-    learned.words.insert(learned.words.begin() + static_cast<std::ptrdiff_t>(before),
-                         fmt::format("{}: removed, as it was learned for other maps",
-                                     request.sensor_file().string()));
+    learned.words.push_back(fmt::format("{}: removed, as it was learned for other maps",
+                                        request.sensor_file().string()));
   }
 }
 
-/// Whether learn_maps() wrote a sensor model, and whether recognition can read it.
-enum class Origin { own, foreign, unreadable };
-Origin origin_of(const std::filesystem::path& file) {
+/// Whether learn_maps() wrote a sensor model.
+bool is_of_maps(const std::filesystem::path& file) {
   try {
-    return read_sensor_model(file).maps.empty() ? Origin::foreign : Origin::own;
+    return !read_sensor_model(file).maps.empty();
   } catch (const Error& error) {
     if (error.fault() != Fault::input) {
       throw;
     }
-    return Origin::unreadable;
+    return false;
   }
 }
 
 }  // namespace
 
 bool learns_sensor(const MapRequest& request, std::vector<std::string>& remarks) {
-  if (!request.to_folder()) {
-    return false;
-  }
-  const bool asked = request.shared.sensor_model.empty();
+  const bool asked = request.to_folder() && request.shared.sensor_model.empty();
   const std::filesystem::path file = request.sensor_file();
   std::error_code ignored;
-  if (request.output.empty() || !std::filesystem::exists(file, ignored)) {
+  if (!request.to_folder() || request.output.empty() || !std::filesystem::exists(file, ignored)) {
     return asked;
   }
-  const Origin origin = origin_of(file);
-  if (origin == Origin::own && !asked) {
+  const bool own = is_of_maps(file);
+  if (own && !asked) {
     remarks.push_back(fmt::format(
         "{}: stays, and was learned for earlier maps: recognition leaves it out with others; "
         "remove it, or build the maps without `sensor-model`",
         file.string()));
-  } else if (origin == Origin::foreign && asked) {
+  } else if (!own && asked) {
     remarks.push_back(fmt::format(
         "{0}: was not written by palpate map, and stays; no sensor is learned. To recognise with "
         "it, give `sensor-model {0}` here and to recognition",
         file.string()));
-  } else if (origin == Origin::unreadable) {
-    remarks.push_back(fmt::format(
-        "{}: was not written by palpate map, and stays; {}it is no sensor model, and recognition "
-        "with maps of this folder refuses it until it is mended or moved",
-        file.string(), asked ? "no sensor is learned; " : ""));
   }
-  return asked && origin == Origin::own;
+  return asked && own;
 }
 
 void learn_sensor(const MapTask& task, const MapOptions& options, LearnedMaps& learned,
                   const std::function<void(double)>& progress) {
   const MapRequest& request = task.request;
   or_say_why_not(request, learned, [&] {
-    const std::vector<FolderMap> all = folder_maps(task, learned);
+    const FolderMaps all = folder_maps(task, learned);
     const std::vector<Recording> touches = touches_of(all);
     CalibrationTask calibration = calibration_task(
         {}, {.threshold = request.shared.threshold, .ratio = request.shared.ratio}, touches, {});

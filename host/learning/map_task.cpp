@@ -19,7 +19,7 @@
 #include "learning/touch_alignment.hpp"
 #include "model/angle_unit.hpp"
 #include "model/element_spacing.hpp"
-#include "options/refused_option.hpp"
+#include "options/option.hpp"
 #include "palpate/error.hpp"
 #include "recognition/recordings.hpp"
 
@@ -31,25 +31,21 @@ namespace {
 void group_by_label(MapTask& task, const ContactClassifier& classifier) {
   const MapRequest& request = task.request;
   const Pose T_object_robot = inverse(given_origin(request).value_or(Pose{}));
-  struct Group {
-    std::vector<Touch> touches;
-    std::vector<TouchSource> sources;
-  };
-  std::map<std::string, Group> groups;
+  std::map<std::string, std::pair<std::vector<Touch>, std::vector<TouchSource>>> groups;
   for (const Recording& recording : task.recordings) {
     const auto [object, own_group] = grouped_object(recording, request.group);
     const std::string& label = request.label.empty() ? object : request.label;
     require_name(recording.path, label);
     const auto [begin, end] = selected_touches(recording, request.shared.frames);
-    Group& group = groups[label];
+    auto& [touches, sources] = groups[label];
     for (std::size_t i = begin; i < end; ++i) {
       Touch touch = recording.touch(i);
       touch.T_robot_sensor = request.unposed ? Pose{} : T_object_robot * touch.T_robot_sensor;
       if (const auto fault = fault_of(known_readings(touch, classifier))) {
         refuse(recording.path, "sensor_pose[{}]: {}", i, *fault);
       }
-      group.touches.push_back(touch);
-      group.sources.push_back({recording.path, i, own_group});
+      touches.push_back(touch);
+      sources.push_back({recording.path, i, own_group});
     }
     if (!request.to_folder() && groups.size() > 1) {
       const Recording& first = task.recordings.front();
@@ -61,8 +57,8 @@ void group_by_label(MapTask& task, const ContactClassifier& classifier) {
     }
   }
   for (auto& [label, group] : groups) {
-    task.objects.push_back({label, std::move(group.touches)});
-    task.sources.push_back(std::move(group.sources));
+    task.objects.push_back({label, std::move(group.first)});
+    task.sources.push_back(std::move(group.second));
   }
 }
 
@@ -114,8 +110,6 @@ void add_remarks(MapTask& task) {
                       "`unposed`",
                       recording.path, recording.size()));
     }
-  }
-  for (const Recording& recording : task.recordings) {
     for (const SetupFinding& finding : recording.findings) {
       task.remarks.push_back(fmt::format("{}: {}", recording.path, finding.words));
     }

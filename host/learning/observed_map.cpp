@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -31,25 +32,6 @@ void visit_cells(const CellRange& cells, const Visit& visit) {
     }
   }
 }
-
-/// A touch's known elements, in the robot frame.
-struct KnownTouch {
-  const Touch* touch = nullptr;
-  std::vector<ElementReading> known;
-};
-
-/// Where touches' known elements lie, and how many there are.
-struct Extent {
-  BoundingBox box;
-  std::size_t readings = 0;
-
-  void take_in(const KnownTouch& of) {
-    for (const ElementReading& reading : of.known) {
-      box.take_in(reading.position_mm);
-    }
-    readings += of.known.size();
-  }
-};
 
 /// What an image says at a place.
 struct ImageSample {
@@ -83,23 +65,6 @@ ImageSample sample(const OccupancyGrid& image, double prior, const glm::dvec2& p
   return result;
 }
 
-/// The map of the touches in some sums.
-OccupancyGrid map_of(const MapSums& sums, const Extent& touched, double radius_mm,
-                     const MapOptions& options, const std::string& label) {
-  if (touched.readings == 0) {
-    throw Error(Fault::input,
-                fmt::format("object '{}': no element of any touch is In Contact or No "
-                            "Contact; check the threshold and the pressure's unit",
-                            label));
-  }
-  OccupancyGrid map =
-      sums.sum(label, cover(touched.box.lower, touched.box.upper, radius_mm, options.cell_mm));
-  if (const auto fault = fault_of(map)) {
-    throw Error(Fault::input, fmt::format("map '{}': {}", label, *fault));
-  }
-  return map;
-}
-
 }  // namespace
 
 MapSums::MapSums(const MapOptions& options, const CellRange& range)
@@ -117,15 +82,16 @@ void MapSums::add(const Touch& touch, std::span<const ElementReading> known, dou
   if (known.empty()) {
     return;
   }
-  const auto spacing = spacing_of(touch.elements_mm);
-  const double near_mm = spacing ? spacing->nearest_mm.most : 2.0 * sensor.spread_mm;
-  const double deviation_mm = std::max(sensor.spread_mm, near_mm / 4.0);
-  const double level_radius_mm = std::max(near_mm, 4.0 * deviation_mm);
   // Around the touch alone, so that many touches over a large map take no more than their area.
   BoundingBox box;
   for (const ElementReading& reading : known) {
     box.take_in(reading.position_mm);
+    touched_.take_in(reading.position_mm);
   }
+  const auto spacing = spacing_of(touch.elements_mm);
+  const double near_mm = spacing ? spacing->nearest_mm.most : 2.0 * sensor.spread_mm;
+  const double deviation_mm = std::max(sensor.spread_mm, near_mm / 4.0);
+  const double level_radius_mm = std::max(near_mm, 4.0 * deviation_mm);
   const CellRange around = cover(box.lower, box.upper, near_mm, cell_mm);
   struct Observed {
     bool seen = false;
@@ -216,6 +182,10 @@ void MapSums::change(const OccupancyGrid& image, const ImagePlace& place, int si
 }
 
 MapSums& MapSums::operator+=(const MapSums& other) {
+  if (!other.touched_.empty()) {
+    touched_.take_in(other.touched_.lower);
+    touched_.take_in(other.touched_.upper);
+  }
   for (std::size_t k = 0; k < cells_.size(); ++k) {
     cells_[k].evidence += other.cells_[k].evidence;
     cells_[k].level += other.cells_[k].level;
@@ -240,8 +210,19 @@ OccupancyGrid MapSums::map(const std::string& label, const CellRange& range, boo
   return map;
 }
 
-OccupancyGrid MapSums::sum(const std::string& label, const CellRange& range) const {
-  return map(label, range, false);
+OccupancyGrid MapSums::sum(const std::string& label, double radius_mm) const {
+  if (touched_.empty()) {
+    throw Error(Fault::input,
+                fmt::format("object '{}': no element of any touch is In Contact or No "
+                            "Contact; check the threshold and the pressure's unit",
+                            label));
+  }
+  OccupancyGrid sum =
+      map(label, cover(touched_.lower, touched_.upper, radius_mm, options_.cell_mm), false);
+  if (const auto fault = fault_of(sum)) {
+    throw Error(Fault::input, fmt::format("map '{}': {}", label, *fault));
+  }
+  return sum;
 }
 
 OccupancyGrid MapSums::mean(const std::string& label) const {
@@ -262,50 +243,45 @@ OccupancyGrid MapSums::mean(const std::string& label) const {
 ObservedMaps observed_maps(std::span<const Touch> touches, std::span<const std::size_t> part,
                            const MapOptions& options, const std::string& label) {
   options.validate();
-  const std::size_t parts = part.empty() ? 1 : *std::ranges::max_element(part) + 1;
-  std::vector<std::vector<KnownTouch>> of_part(parts);
-  std::vector<Extent> without(parts);
-  Extent all;
-  for (std::size_t i = 0; i < touches.size(); ++i) {
-    const KnownTouch touch{&touches[i], known_readings(touches[i], options.classifier)};
-    if (const auto fault = fault_of(touch.known)) {
-      throw Error(Fault::input, fmt::format("touch {}: {}", i, *fault));
+  std::vector<std::vector<ElementReading>> known;
+  BoundingBox box;
+  std::size_t readings = 0;
+  for (const Touch& touch : touches) {
+    known.push_back(known_readings(touch, options.classifier));
+    if (const auto fault = fault_of(known.back())) {
+      throw Error(Fault::input, fmt::format("touch {}: {}", known.size() - 1, *fault));
     }
-    all.take_in(touch);
-    for (std::size_t other = 0; other < parts; ++other) {
-      if (other != part[i]) {
-        without[other].take_in(touch);
-      }
+    for (const ElementReading& reading : known.back()) {
+      box.take_in(reading.position_mm);
     }
-    of_part[part[i]].push_back(touch);
+    readings += known.back().size();
   }
   // The radius of MapBuilder, so that both make maps of the same cells.
-  const double radius_mm = support_radius_mm(options.sensor, all.readings);
-  const CellRange cells = all.readings == 0
-                              ? CellRange{}
-                              : cover(all.box.lower, all.box.upper, radius_mm, options.cell_mm);
-  const MapSums none(options, cells);
-  std::vector<MapSums> sums(parts, none);
-  tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t own) {
-    for (const auto& [touch, known] : of_part[own]) {
-      sums[own].add(*touch, known, radius_mm);
-    }
-  });
-  ObservedMaps maps;
-  MapSums sum = none;
-  for (std::size_t own = 0; own < parts; ++own) {
-    sum += sums[own];
-    MapSums others = none;
-    for (std::size_t other = 0; other < parts; ++other) {
-      if (other != own) {
-        others += sums[other];
+  const double radius_mm = support_radius_mm(options.sensor, readings);
+  const MapSums none(
+      options, box.empty() ? CellRange{} : cover(box.lower, box.upper, radius_mm, options.cell_mm));
+  std::vector<MapSums> sums(part.empty() ? 1 : *std::ranges::max_element(part) + 1, none);
+  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t own) {
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+      if (part[i] == own) {
+        sums[own].add(touches[i], known[i], radius_mm);
       }
     }
-    const bool only = of_part[own].size() == touches.size();
-    maps.without.push_back(only ? OccupancyGrid{}
-                                : map_of(others, without[own], radius_mm, options, label));
+  });
+  const auto sum_without = [&](std::optional<std::size_t> left_out) {
+    MapSums sum = none;
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+      if (k != left_out) {
+        sum += sums[k];
+      }
+    }
+    return sum.sum(label, radius_mm);
+  };
+  ObservedMaps maps{.all = sum_without({}), .without = {}};
+  for (std::size_t own = 0; own < sums.size(); ++own) {
+    const bool only = std::ranges::all_of(part, [&](std::size_t of) { return of == own; });
+    maps.without.push_back(only ? OccupancyGrid{} : sum_without(own));
   }
-  maps.all = map_of(sum, all, radius_mm, options, label);
   return maps;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "model/bounding_box.hpp"
 #include "model/cell_range.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
@@ -64,9 +65,10 @@ class MapSums {
   /// Adds sums over the same cells.
   MapSums& operator+=(const MapSums& other);
 
-  /// The map of these cells: the sum of the evidence, the number of touches that observed a cell,
-  /// and their mean pressure.
-  OccupancyGrid sum(const std::string& label, const CellRange& range) const;
+  /// The map of touches that were added: the sum of the evidence, the number of touches that
+  /// observed a cell, and their mean pressure.
+  /// @throws Error where no touch has a known element, or the map is not sound
+  OccupancyGrid sum(const std::string& label, double radius_mm) const;
   /// The map of the observed cells, or of one cell where there are none: the weighted means of
   /// evidence and pressure, and the number of presses that observed a cell.
   OccupancyGrid mean(const std::string& label) const;
@@ -85,6 +87,7 @@ class MapSums {
 
   MapOptions options_;
   CellRange range_;
+  BoundingBox touched_;      ///< around the known elements of touches
   std::vector<Cell> cells_;  ///< of the range, [ny, nx]
 };
 

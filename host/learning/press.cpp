@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <iterator>
 #include <map>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -11,8 +12,6 @@
 #include <tbb/parallel_for.h>
 
 #include "learning/observed_map.hpp"
-#include "model/elements_that.hpp"
-#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -50,19 +49,6 @@ auto named(const std::string& name, const Build& build) {
   } catch (const Error& error) {
     throw Error(error.fault(), fmt::format("{}: {}", name, error.what()));
   }
-}
-
-/// The presses of every object, with its label but no map, by label.
-std::vector<TrainingMap> objects_of(const std::vector<Press>& presses) {
-  std::map<std::string, std::vector<std::size_t>> of_label;
-  for (std::size_t i = 0; i < presses.size(); ++i) {
-    of_label[presses[i].label].push_back(i);
-  }
-  std::vector<TrainingMap> objects;
-  for (auto& [label, own] : of_label) {
-    objects.push_back({{.label = label}, std::move(own)});
-  }
-  return objects;
 }
 
 }  // namespace
@@ -173,72 +159,6 @@ bool at_known_poses(const std::vector<Press>& presses) {
                              [](const Press& press) { return press.T_object_robot.has_value(); });
 }
 
-CheckedPresses without_unknown(const std::vector<Press>& presses,
-                               const ContactClassifier& classifier) {
-  CheckedPresses checked;
-  std::string first;
-  for (const Press& press : presses) {
-    const std::vector<TouchEvidence> evidence =
-        evidence_of(press.touches, {.classifier = classifier});
-    if (std::ranges::any_of(
-            evidence, [](const TouchEvidence& touch) { return !touch.known().readings.empty(); })) {
-      checked.presses.push_back(press);
-    } else if (first.empty()) {
-      first = press.name;
-    }
-  }
-  if (checked.presses.empty()) {
-    throw Error(Fault::input, fmt::format("{}: all elements are Unknown, as in all other touches: "
-                                          "dead, without a number, or of the same pressure",
-                                          first));
-  }
-  if (const std::size_t left_out = presses.size() - checked.presses.size(); left_out > 0) {
-    checked.warnings.push_back(fmt::format(
-        "{}: all elements are Unknown: dead, without a number, or of the same pressure; left out{}",
-        first, left_out > 1 ? fmt::format(", with {} more such touches", left_out - 1) : ""));
-  }
-  return checked;
-}
-
-std::vector<std::string> stuck_elements(const std::vector<Press>& presses, double threshold,
-                                        std::span<const double> contact_pressures) {
-  constexpr std::size_t fewest_touches = 5;
-  constexpr double rare = 0.01;  // share of the other elements' readings In Contact
-  std::map<std::size_t, std::vector<const Touch*>> arrays;
-  for (const Press& press : presses) {
-    for (const Touch& touch : press.touches) {
-      arrays[touch.pressure.size()].push_back(&touch);
-    }
-  }
-  std::vector<std::string> warnings;
-  for (const auto& [elements, touches] : arrays) {
-    std::vector<std::size_t> stuck;
-    for (std::size_t e = 0; touches.size() >= fewest_touches && e < elements; ++e) {
-      const double pressure = touches.front()->pressure[e];
-      const bool same = std::ranges::all_of(touches, [&](const Touch* touch) {
-        return is_living(*touch, e) && touch->pressure[e] == pressure;
-      });
-      if (!same || !(pressure > threshold)) {
-        continue;
-      }
-      const auto [first, last] =
-          std::equal_range(contact_pressures.begin(), contact_pressures.end(), pressure);
-      const double others = static_cast<double>(last - first) - static_cast<double>(touches.size());
-      if (others <= rare * static_cast<double>(contact_pressures.size() - touches.size())) {
-        stuck.push_back(e);
-      }
-    }
-    if (!stuck.empty()) {
-      warnings.push_back(
-          fmt::format("{} the same pressure above the threshold in all {} touches: "
-                      "it counts as in contact, and seems stuck; set 'valid' to 0 "
-                      "there",
-                      elements_that(stuck, "reads", "read"), touches.size()));
-    }
-  }
-  return warnings;
-}
-
 std::vector<TrainingMap> maps_of_presses(const std::vector<Press>& presses,
                                          const MapOptions& options) {
   std::vector<TrainingMap> maps(presses.size());
@@ -253,27 +173,34 @@ std::vector<TrainingMap> maps_of_presses(const std::vector<Press>& presses,
 MapsByFolds maps_by_folds(const std::vector<Press>& presses, const MapOptions& options,
                           std::size_t folds) {
   const std::vector<std::size_t> fold = folds_of(presses, folds);
-  MapsByFolds maps{.of_objects = objects_of(presses), .without_folds = {}};
+  std::map<std::string, std::vector<std::size_t>> of_label;
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    of_label[presses[i].label].push_back(i);
+  }
+  MapsByFolds maps;
+  for (auto& [label, own] : of_label) {
+    maps.of_objects.push_back({{.label = label}, std::move(own)});
+  }
   std::vector<std::vector<TrainingMap>> without(maps.of_objects.size());
   tbb::parallel_for(std::size_t{0}, maps.of_objects.size(), [&](std::size_t object) {
-    TrainingMap& object_map = maps.of_objects[object];
+    OccupancyGrid& map = maps.of_objects[object].map;
+    const std::vector<std::size_t>& own = maps.of_objects[object].presses;
     std::vector<Touch> touches;
     std::vector<std::size_t> part;
-    for (const std::size_t press : object_map.presses) {
+    for (const std::size_t press : own) {
       touches.push_back(presses[press].touches.front());
       touches.back().T_robot_sensor =
           *presses[press].T_object_robot * touches.back().T_robot_sensor;
       part.push_back(fold[press]);
     }
-    ObservedMaps built = named(object_map.map.label, [&] {
-      return observed_maps(touches, part, options, object_map.map.label);
-    });
-    object_map.map = std::move(built.all);
-    for (std::size_t own = 0; own < built.without.size(); ++own) {
-      if (std::ranges::find(part, own) != part.end() && !built.without[own].log_odds.empty()) {
-        TrainingMap& map = without[object].emplace_back(
-            TrainingMap{std::move(built.without[own]), object_map.presses});
-        std::erase_if(map.presses, [&](std::size_t press) { return fold[press] == own; });
+    ObservedMaps built =
+        named(map.label, [&] { return observed_maps(touches, part, options, map.label); });
+    map = std::move(built.all);
+    for (const std::size_t k : std::set(part.begin(), part.end())) {
+      if (!built.without[k].log_odds.empty()) {
+        TrainingMap& others =
+            without[object].emplace_back(TrainingMap{std::move(built.without[k]), own});
+        std::erase_if(others.presses, [&](std::size_t press) { return fold[press] == k; });
       }
     }
   });

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "palpate/contact.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
@@ -66,23 +65,6 @@ std::vector<Press> presses_without(std::size_t fold, const std::vector<Press>& p
 
 /// Whether all presses are at known poses.
 bool at_known_poses(const std::vector<Press>& presses);
-
-/// Presses, and sentences about what seems wrong with them.
-struct CheckedPresses {
-  std::vector<Press> presses;
-  std::vector<std::string> warnings;
-};
-/// Leaves out presses all of whose elements are Unknown, and warns of them.
-/// @throws Error where no press is left
-CheckedPresses without_unknown(const std::vector<Press>& presses,
-                               const ContactClassifier& classifier);
-
-/// Warns of elements that seem stuck: in arrays that touched five times or more, they read the very
-/// same pressure above the threshold each time, which hardly any other reading In Contact equals.
-/// @param contact_pressures of all elements In Contact, ascending
-/// @returns whole sentences; none where all is well
-std::vector<std::string> stuck_elements(const std::vector<Press>& presses, double threshold,
-                                        std::span<const double> contact_pressures);
 
 /// A map that presses are compared with, and the presses that it was built from.
 struct TrainingMap {

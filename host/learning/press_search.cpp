@@ -9,41 +9,39 @@
 
 #include "learning/press_placement.hpp"
 #include "model/bounding_box.hpp"
-#include "model/contact_readings.hpp"
 #include "model/map_likelihood.hpp"
+#include "model/touch_evidence.hpp"
 
 namespace palpate {
 
-PressSide::PressSide(const Touch& touch, const ContactModel& contact, bool mirrored)
-    : evidence_(touch, contact), contact_(evidence_.contact()), touch_(touch) {
-  if (mirrored) {
-    for (std::vector<glm::dvec2>* elements : {&evidence_.elements_mm, &contact_.elements_mm}) {
-      for (glm::dvec2& element : *elements) {
-        element.x = -element.x;
-      }
-    }
-    touch_.elements_mm = evidence_.elements_mm;
+PressSide::PressSide(const Touch& given, const ContactModel& model, bool mirrored) : touch(given) {
+  TouchEvidence& all = evidence.emplace_back(given, model);
+  for (glm::dvec2& element : all.elements_mm) {
+    element.x *= mirrored ? -1.0 : 1.0;
   }
-  const double count = in_contact() ? static_cast<double>(evidence_.contacts) : 1.0;
+  if (mirrored) {
+    touch.elements_mm = all.elements_mm;
+  }
+  TouchEvidence& touched = contact.emplace_back(all.contact());
+  const double count = all.in_contact() ? static_cast<double>(all.contacts) : 1.0;
   glm::dvec2 middle_mm(0.0);
-  for (const glm::dvec2& element : contact_.elements_mm) {
+  for (const glm::dvec2& element : touched.elements_mm) {
     middle_mm += element;
   }
   middle_mm /= count;
-  for (const glm::dvec2& element : contact_.elements_mm) {
+  double squares = 0.0;
+  for (const glm::dvec2& element : touched.elements_mm) {
     const glm::dvec2 from_middle = element - middle_mm;
-    reach_mm_ += glm::dot(from_middle, from_middle) / count;
+    squares += glm::dot(from_middle, from_middle) / count;
   }
-  reach_mm_ = std::sqrt(reach_mm_);
-  for (Pose* pose : {&evidence_.T_robot_sensor, &contact_.T_robot_sensor, &touch_.T_robot_sensor}) {
-    *pose = {-middle_mm, 0.0};
-  }
+  reach_mm = std::sqrt(squares);
+  all.T_robot_sensor = touched.T_robot_sensor = touch.T_robot_sensor = {-middle_mm, 0.0};
 }
 
 double displacement_mm(const PressSide& press, const Pose& T_object_robot, const Pose& other) {
   const glm::dvec2 d = T_object_robot.translation_mm - other.translation_mm;
   const double turned = 1.0 - std::cos(T_object_robot.theta_rad - other.theta_rad);
-  return std::sqrt(glm::dot(d, d) + 2.0 * press.reach_mm() * press.reach_mm() * turned);
+  return std::sqrt(glm::dot(d, d) + 2.0 * press.reach_mm * press.reach_mm * turned);
 }
 
 /// One side of a press on a map, at all bins.
@@ -73,7 +71,7 @@ std::vector<std::size_t> best_bins(const std::vector<float>& bins, const PoseLat
 /// All angles, and the places of the middle of a press's contact that PressSearch compares.
 PoseLattice lattice_for(const PressSide& side, const Hypothesis& map, double step_mm, int angles) {
   const BoundingBox box = occupied_box(map.map);
-  const double beside_mm = side.reach_mm() / 2.0;
+  const double beside_mm = side.reach_mm / 2.0;
   const auto axis = [&](double lower, double upper) {
     const double middle = (lower + upper) / 2.0;
     const double extent = upper - lower + 2.0 * beside_mm;
@@ -104,32 +102,6 @@ double PressSearch::gain(std::span<const TouchEvidence> press, const Hypothesis&
   contact.prior = map.compared().prior;  // beyond the layer lies its own prior
   const MapLikelihood likelihood(map.compared(), contact);
   return likelihood.at(press, T_object_robot) - likelihood.at(press, beyond);
-}
-
-Summit<Pose> PressSearch::top_near(const SideScores& scores, const Pose& start) const {
-  constexpr int halvings = 3;
-  double shift_mm = step_mm_ / 2.0;
-  double turn_rad = std::numbers::pi / angles_;
-  const auto neighbours_of = [&](const Pose& at) {
-    std::vector<Pose> moved;
-    for (const double sign : {-1.0, 1.0}) {
-      for (const Pose& move : {Pose{{sign * shift_mm, 0.0}, 0.0}, Pose{{0.0, sign * shift_mm}, 0.0},
-                               Pose{{0.0, 0.0}, sign * turn_rad}}) {
-        moved.push_back({at.translation_mm + move.translation_mm, at.theta_rad + move.theta_rad});
-      }
-    }
-    return moved;
-  };
-  const auto value_of = [&](const Pose& at) {
-    return scores.placer.log_likelihood(scores.side.evidence(), at);
-  };
-  Summit<Pose> top{start, value_of(start)};
-  for (int halving = 0; halving < halvings; ++halving) {
-    top = climb(top, neighbours_of, value_of);
-    shift_mm /= 2.0;
-    turn_rad /= 2.0;
-  }
-  return top;
 }
 
 double PressSearch::certainty_of(const Pose& best, const SideScores& on,
@@ -173,7 +145,7 @@ PressPlace PressSearch::best_place(const std::vector<PressSide>& sides,
     const PoseLattice lattice = lattice_for(side, map, step_mm_, angles_);
     SideScores& on = scores.emplace_back(
         SideScores{side, !scores.empty(), lattice, PressPlacer(map, contact_, lattice), {}});
-    on.bins = on.placer.log_likelihoods(side.evidence());
+    on.bins = on.placer.log_likelihoods(side.evidence);
     places += on.bins.size();
     for (const std::size_t bin : best_bins(on.bins, lattice)) {
       best_at_angles.push_back(
@@ -195,13 +167,18 @@ PressPlace PressSearch::best_place(const std::vector<PressSide>& sides,
     }
   }
   for (Start& start : starts) {
-    start.at = top_near(*start.on, start.at.place);
+    const auto value_of = [&](const Pose& pose) {
+      return start.on->placer.log_likelihood(start.on->side.evidence, pose);
+    };
+    start.at.value = value_of(start.at.place);
+    start.at = climb_poses(start.at, {glm::dvec2(step_mm_ / 2.0), std::numbers::pi / angles_}, 3,
+                           value_of);
   }
   const auto& [on, best] =
       *std::ranges::max_element(starts, {}, [](const Start& start) { return start.at.value; });
   return {.T_object_robot = best.place,
           .mirrored = on->mirrored,
-          .gain = best.value - on->placer.log_likelihood(on->side.evidence(), beyond),
+          .gain = best.value - on->placer.log_likelihood(on->side.evidence, beyond),
           .certainty = certainty_of(best.place, *on, scores),
           .log_places = std::log(static_cast<double>(places))};
 }

@@ -14,26 +14,15 @@ namespace palpate {
 
 /// A press on one of the object's sides: as it is, or mirrored, x to -x in the sensor frame. Its
 /// robot frame has the origin in the middle of its contact, and the sensor's axes.
-class PressSide {
- public:
-  PressSide(const Touch& touch, const ContactModel& contact, bool mirrored);
+struct PressSide {
+  PressSide(const Touch& given, const ContactModel& model, bool mirrored);
   PressSide(PressSide&&) = default;
   PressSide& operator=(PressSide&&) = default;
 
-  /// A view into the touch given and, where the press is mirrored, into this object.
-  const Touch& touch() const { return touch_; }
-  std::span<const TouchEvidence> evidence() const { return {&evidence_, 1}; }
-  /// The evidence of its elements In Contact alone.
-  std::span<const TouchEvidence> contact() const { return {&contact_, 1}; }
-  bool in_contact() const { return evidence_.in_contact(); }
-  /// The contact's root mean squared distance from its middle.
-  double reach_mm() const { return reach_mm_; }
-
- private:
-  TouchEvidence evidence_;
-  TouchEvidence contact_;
-  Touch touch_;
-  double reach_mm_ = 0.0;
+  std::vector<TouchEvidence> evidence;  ///< of the one touch
+  std::vector<TouchEvidence> contact;   ///< of its elements In Contact alone
+  Touch touch;  ///< a view into the touch given and, where the press is mirrored, into `evidence`
+  double reach_mm = 0.0;  ///< the contact's root mean squared distance from its middle
 };
 
 /// The root mean squared displacement in mm of a press's contact between two poses.
@@ -73,7 +62,6 @@ class PressSearch {
  private:
   struct SideScores;
 
-  Summit<Pose> top_near(const SideScores& scores, const Pose& start) const;
   double certainty_of(const Pose& best, const SideScores& on,
                       const std::vector<SideScores>& scores) const;
 

@@ -9,10 +9,11 @@
 #include <fmt/format.h>
 
 #include "estimation/maps/left_out_fit.hpp"
+#include "learning/held_out.hpp"
 #include "learning/progress.hpp"
 #include "learning/setup_judge.hpp"
-#include "learning/temperature_fit.hpp"
 #include "model/element_spacing.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -39,25 +40,49 @@ double spacing_mm_of(const std::vector<Press>& presses) {
   return spacing_mm;
 }
 
+/// The presses but for those all of whose elements are Unknown, which are warned of. Throws Error
+/// where no press is left.
+std::vector<Press> without_unknown(const std::vector<Press>& presses,
+                                   const ContactClassifier& classifier,
+                                   std::vector<std::string>& warnings) {
+  std::vector<Press> known;
+  std::string first;
+  for (const Press& press : presses) {
+    if (std::ranges::any_of(evidence_of(press.touches, {.classifier = classifier}),
+                            &TouchEvidence::tells)) {
+      known.push_back(press);
+    } else if (first.empty()) {
+      first = press.name;
+    }
+  }
+  if (known.empty()) {
+    throw Error(Fault::input, fmt::format("{}: all elements are Unknown, as in all other touches: "
+                                          "dead, without a number, or of the same pressure",
+                                          first));
+  }
+  if (const std::size_t left_out = presses.size() - known.size(); left_out > 0) {
+    warnings.push_back(fmt::format(
+        "{}: all elements are Unknown: dead, without a number, or of the same pressure; left out{}",
+        first, left_out > 1 ? fmt::format(", with {} more such touches", left_out - 1) : ""));
+  }
+  return known;
+}
+
 /// The bins' lattice, or as fine a one as touches are tried on in a short time.
 /// @param given whether a user gave the bins
 PoseLattice affordable(const CalibrationSettings& settings, const LearnedPresses& learned,
-                       bool given) {
-  // Among the maps of folds, a touch is tried on the one that was built without it.
-  std::map<std::string, std::size_t> maps_of;
-  for (const TrainingMap& map : learned.maps) {
-    std::size_t& count = maps_of[map.map.label];
-    count = map.presses.empty() ? std::min(count + 1, settings.most_maps) : 1;
-  }
+                       const std::vector<std::string>& labels, bool given) {
   std::size_t maps = 0;
-  for (const auto& [label, count] : maps_of) {
-    maps += count;
+  for (const std::string& label : labels) {
+    const auto own = static_cast<std::size_t>(std::ranges::count(
+        learned.maps, label, [](const TrainingMap& map) { return map.map.label; }));
+    // Among the maps of folds, a touch is tried on the one that was built without it.
+    maps += settings.given.empty() ? 1 : std::min(own, settings.most_maps);
   }
-  const TrialCost cost{.maps = maps,
-                       .spacing_mm = learned.readings.spacing_mm,
-                       .minutes = given ? minutes_at_bins : minutes};
   return affordable_lattice(settings.bins->lattice, learned.presses, learned.readings.classifier,
-                            cost);
+                            {.maps = maps,
+                             .spacing_mm = learned.readings.spacing_mm,
+                             .minutes = given ? minutes_at_bins : minutes});
 }
 
 std::vector<std::string> labels_of(const std::vector<TrainingMap>& maps) {
@@ -70,8 +95,7 @@ std::vector<std::string> labels_of(const std::vector<TrainingMap>& maps) {
 
 /// Warns of what the presses cannot tell before any table, in whole sentences.
 std::vector<std::string> warnings_about(const LearnedPresses& learned) {
-  std::vector<std::string> warnings = stuck_elements(
-      learned.presses, learned.readings.classifier.threshold, learned.readings.pressures);
+  std::vector<std::string> warnings;
   std::set<std::string> uncompared;
   for (const Press& press : learned.presses) {
     uncompared.insert(press.label);
@@ -134,15 +158,14 @@ Trials cross_validate(const LearnedPresses& learned, const std::vector<std::stri
   for (std::size_t fold = 0; fold < settings.folds; ++fold) {
     const std::vector<Press> others = presses_without(fold, learned.presses, settings.folds);
     const auto show_learning = work.part(count * table_cost);
-    if (others.size() == learned.presses.size()) {  // there are fewer groups than folds
-      work.part((count + 1.0) / folds)(1.0);
-      continue;
+    if (others.size() < learned.presses.size()) {  // else there are fewer groups than folds
+      const std::vector<FoldModel> models = models_of(others, settings, show_learning);
+      for (std::size_t i = 0; i < models.size(); ++i) {
+        CrossValidation& found = i < trials.tables.size() ? trials.tables[i] : trials.eq7;
+        found += try_fold(fold, learned.presses, labels, models[i], settings);
+      }
     }
-    const std::vector<FoldModel> models = models_of(others, settings, show_learning);
-    for (std::size_t i = 0; i < models.size(); ++i) {
-      CrossValidation& found = i < trials.tables.size() ? trials.tables[i] : trials.eq7;
-      found += try_fold(fold, learned.presses, labels, models[i], settings, work.part(1.0 / folds));
-    }
+    work.part((count + 1.0) / folds)(1.0);
   }
   for (TriedModel& one : trials.tables) {
     one.after = tempered_by_folds(one.unknowns);
@@ -171,16 +194,6 @@ std::vector<HeldOut> said_by_kept(const std::vector<TriedModel>& tried, std::siz
     std::ranges::move(of_fold(kept(tried, fold).*said, fold, true), std::back_inserter(all));
   }
   return all;
-}
-
-/// The distributions of the features of presses at unknown poses, with their weight.
-std::optional<LearnedFeatures> features_of(const LearnedPresses& learned, double weight) {
-  if (at_known_poses(learned.presses)) {
-    return {};
-  }
-  LearnedFeatures features = learn_features(learned.presses, learned.readings.classifier);
-  features.weight = weight;
-  return features;
 }
 
 /// The scale of the objects' z together, of best fits and of strangers; none where no object's z
@@ -219,14 +232,14 @@ void judge(const Trials& trials, std::size_t folds, bool known_poses, SensorCali
   const auto table = said_by_kept(trials.tables, folds, &TriedModel::unknowns);
   const auto after = said_by_kept(trials.tables, folds, &TriedModel::after);
   for (const TriedModel& one : trials.tables) {
-    judged.tried.push_back({one.kind, scores_of(single_touches(one.after), 1.0).log_loss});
+    judged.tried.push_back({one.kind, scores_of(single_touches(one.after)).log_loss});
   }
-  judged.before = scores_of(single_touches(eq7), 1.0);
-  judged.table = scores_of(single_touches(table), 1.0);
-  judged.after = scores_of(single_touches(after), 1.0);
+  const auto scores = [&](std::vector<HeldOut> (*some)(std::span<const HeldOut>)) {
+    return ComparedScores{scores_of(some(eq7)), scores_of(some(table)), scores_of(some(after))};
+  };
+  judged.touches = scores(single_touches);
   if (!groups_in(after).empty()) {
-    const auto scores = [](std::span<const HeldOut> all) { return scores_of(groups_in(all), 1.0); };
-    judged.groups = GroupScores{presses_in_group, scores(eq7), scores(table), scores(after)};
+    judged.groups = scores(groups_in);
   }
   if (judged.groups || !known_poses) {
     judged.gain = gain_of(eq7, after);
@@ -244,7 +257,7 @@ void judge(const Trials& trials, std::size_t folds, bool known_poses, SensorCali
         "on touches that it has not seen, the learned table has a log-loss of {:.3f}, worse than "
         "{:.3f} by Eq. 7 with a temperature: give more touches of each object, or recognize "
         "without the sensor model",
-        judged.after->log_loss, scores_of(without, 1.0).log_loss));
+        judged.touches->after.log_loss, scores_of(without).log_loss));
   }
 }
 
@@ -255,7 +268,10 @@ void set_numbers(const TriedModel& model, const LearnedPresses& learned, Learned
   sensor.gamma = gamma_of(model.placed, model.learning, learned);
   sensor.temperature = fit.temperature;
   sensor.temperature_growth = fit.growth;
-  sensor.features = features_of(learned, fit.feature_weight);
+  if (!at_known_poses(learned.presses)) {
+    sensor.features = learn_features(learned.presses, learned.readings.classifier);
+    sensor.features->weight = fit.feature_weight;
+  }
   sensor.fit_scale = fit_scale_of(model.unknowns, learned.presses);
   sensor.pose_scale = pose_scale_of(model.place_errors);
 }
@@ -302,18 +318,19 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& given_presses,
   const std::vector<Press> presses =
       array_offset ? with_offset(given_presses, *array_offset->array_offset) : given_presses;
   const LearnedReadings readings = learn_readings(presses, settings.readings);
-  const CheckedPresses checked = without_unknown(presses, readings.classifier);
+  std::vector<std::string> warnings;
+  const std::vector<Press> known = without_unknown(presses, readings.classifier, warnings);
   if (known_poses) {
-    settings.bins = options.bins.value_or(
-        RecognitionBins{fine_lattice(checked.presses, settings.readings.spacing_mm)});
+    settings.bins =
+        options.bins.value_or(RecognitionBins{fine_lattice(known, settings.readings.spacing_mm)});
     const PoseLattice& lattice = settings.bins->lattice;
     lattice.validate();
     if (settings.bins->auto_pivot) {
-      require_within(checked.presses, lattice);
+      require_within(known, lattice);
     }
     settings.steps = {lattice.x_mm.step(), lattice.y_mm.step(), lattice.theta_rad.step()};
   }
-  const LearnedPresses learned = with_maps(checked.presses, readings, settings);
+  const LearnedPresses learned = with_maps(known, readings, settings);
   const std::vector<std::string> labels = labels_of(learned.maps);
   SensorCalibration calibration{.sensor = {.pressure_unit = settings.readings.pressure_unit,
                                            .noise = readings.noise,
@@ -324,7 +341,7 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& given_presses,
                                 .maps = readings.maps,
                                 .array_offset = std::move(array_offset),
                                 .objects = labels.size(),
-                                .warnings = checked.warnings};
+                                .warnings = std::move(warnings)};
   std::ranges::copy(warnings_about(learned), std::back_inserter(calibration.warnings));
   if (labels.size() < 2) {
     const TableLearning table = table_learning(settings.tables.back(), learned, settings);
@@ -337,12 +354,24 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& given_presses,
     return calibration;
   }
   if (known_poses) {
-    settings.bins->lattice = affordable(settings, learned, options.bins.has_value());
+    settings.bins->lattice = affordable(settings, learned, labels, options.bins.has_value());
   }
   const Trials trials = cross_validate(learned, labels, settings, progress);
   set_numbers(kept(trials.tables), learned, calibration.sensor);
   judge(trials, options.folds, known_poses, calibration);
   return calibration;
+}
+
+std::string unlearned_strangers(const LearnedSensor& sensor) {
+  const bool known_poses = sensor.bins.has_value();
+  if (!sensor.fit_scale || (known_poses ? sensor.fit_scale->stranger_sd.has_value()
+                                        : sensor.fit_scale->stranger_single_touch.has_value())) {
+    return "";
+  }
+  return known_poses ? "\"(none)\" goes by a figure of Palpate's own for how badly strangers fit; "
+                       "to learn it, give 15 touches or more of each of three objects"
+                     : "how badly strangers fit is not learned, so that a press does not tell "
+                       "\"(none)\"; give presses of three objects or more";
 }
 
 }  // namespace palpate

@@ -3,13 +3,16 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "learning/cross_validation.hpp"
+#include "palpate/device.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "palpate/setup_finding.hpp"
+#include "palpate/touch.hpp"
+#include "recognition/request.hpp"
 
 namespace palpate {
 
@@ -25,12 +28,11 @@ struct TriedTable {
   double log_loss = 0.0;
 };
 
-/// Scores of the touches, several of one object at a time.
-struct GroupScores {
-  std::size_t touches = 0;  ///< of a group
-  Scores before;            ///< see SensorCalibration::before
-  Scores table;
-  Scores after;
+/// Scores of models in the cross-validation.
+struct ComparedScores {
+  Scores before;  ///< Eq. 7 with gamma 0.1, temperature 1
+  Scores table;   ///< the table, temperature 1
+  Scores after;   ///< the table, temperature and features
 };
 
 /// A learned sensor and how good it is on presses that it has not seen.
@@ -41,12 +43,10 @@ struct SensorCalibration {
   /// all else is learned with the array there. None where it sits where the recordings say.
   std::optional<SetupFinding> array_offset = {};
   std::size_t objects = 0;
-  std::vector<TriedTable> tried;  ///< in the options' order; none with one object
-  /// Scores of the cross-validation; none with one object.
-  std::optional<Scores> before;       ///< Eq. 7 with gamma 0.1, temperature 1
-  std::optional<Scores> table;        ///< the table, temperature 1
-  std::optional<Scores> after;        ///< the table, temperature and features
-  std::optional<GroupScores> groups;  ///< none for presses at unknown poses, or few touches
+  std::vector<TriedTable> tried;          ///< in the options' order; none with one object
+  std::optional<ComparedScores> touches;  ///< of single touches; none with one object
+  /// Of presses_in_group touches of one object; none for presses at unknown poses, or few touches.
+  std::optional<ComparedScores> groups;
   std::optional<SensorGain> gain;     ///< none for few touches at known poses, or one object
   std::vector<std::string> warnings;  ///< what could not be learned, in whole sentences
 };
@@ -69,10 +69,9 @@ struct SensorCalibration {
 ///   one press: refused; so are presses none of which has a map of its object without it
 ///   a press all of whose elements are Unknown: left out, with a warning; refused where all are
 ///   a dead element: left out everywhere
-///   a stuck element, the same high pressure in each touch: counts as In Contact, with a warning
 ///   presses whose other folds tell no threshold: not judged
 ///   levels that no reading reached, and nodes that no map had: what Eq. 7 says, see table_of();
-///   levels of the same pressures are merged, see level_edges_of()
+///   levels of the same pressures are merged, see LearnedReadings::level_edges()
 ///   an object whose touches have no map without them: nothing but the threshold, noise, prior and
 ///   its features is learned from it, with a warning
 ///   two labels of the same object: the temperature grows until both are as likely; no warning
@@ -86,5 +85,44 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,
                                    const CalibrationSettings& options,
                                    const std::function<void(double)>& progress = {});
+
+/// Says, without a full stop, that touches did not tell how badly strangers fit; "" where they did,
+/// or where nothing of fits was learned.
+std::string unlearned_strangers(const LearnedSensor& sensor);
+
+/// What is asked of a calibration beside a Request's classifier, bins, region and frames, as a user
+/// says it.
+struct CalibrationRequest {
+  bool unposed = false;        ///< the recordings' poses do not count
+  std::string layer = "auto";  ///< auto, mean_level or log_odds
+  std::optional<int> levels;   ///< of readings; none: as default_tables() has them
+  int max_maps = 5;            ///< CalibrationSettings::most_maps
+  std::string group;           ///< what is left out together, see grouped_object()
+};
+
+/// What calibrate_sensor() takes. Presses are views into the recordings.
+struct CalibrationTask {
+  std::vector<Press> presses;
+  std::vector<OccupancyGrid> maps;
+  CalibrationSettings options;
+
+  bool known_poses() const { return presses.front().T_object_robot.has_value(); }
+};
+
+/// Makes the task: where all touches of each recording are at one pose, poses count as unknown.
+/// With the layer auto, touches at known poses are compared by the mean pressure, on drawn maps by
+/// log odds; at unknown ones both layers are tried, but without a mean level of every map only log
+/// odds. On given maps, touches at known poses lie where the recording's truth says, or else where
+/// the object was learned.
+/// @param recognition what recognize will be given; its classifier, which is learned where it is
+/// left out, bins, region and frames alone count
+/// @param recordings of touches of one pressure unit, at least one
+/// @param maps to compare touches with
+/// @throws Error naming the option or the recording, where a value is out of range, a recording
+/// names no object, some recordings alone have poses, bins are given for unknown poses, or a map
+/// lacks the mean level that it needs
+CalibrationTask calibration_task(const CalibrationRequest& request, const Request& recognition,
+                                 std::span<const Recording> recordings,
+                                 std::span<const GivenMap> maps);
 
 }  // namespace palpate

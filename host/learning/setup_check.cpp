@@ -6,13 +6,14 @@
 #include <numbers>
 #include <optional>
 #include <set>
+#include <string>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "learning/press.hpp"
-#include "learning/progress.hpp"
 #include "learning/setup_judge.hpp"
 #include "model/bounding_box.hpp"
 #include "model/map_likelihood.hpp"
@@ -49,48 +50,39 @@ std::vector<PoseUnit> possible_units(const SetupJudge& judge, const Setup& setup
   const bool may_be_metres = places.diagonal() < 0.1 * array_reach_mm(setup.elements_mm);
   const bool may_be_degrees = most_angle > circle;
   // An angle that counts turns exceeds a circle in radians, too.
-  std::vector<PoseUnit> units;
-  if (may_be_metres && may_be_degrees) {
-    units.push_back({true, true});
-  }
-  if (may_be_metres) {
-    units.push_back({true, false});
-  }
-  if (may_be_degrees) {
-    units.push_back({false, true});
-  }
+  std::vector<PoseUnit> units{{true, true}, {true, false}, {false, true}};
+  std::erase_if(units, [&](const PoseUnit& unit) {
+    return (unit.metres && !may_be_metres) || (unit.degrees && !may_be_degrees);
+  });
   return units;
 }
 
-SetupFinding unit_finding(const PoseUnit& unit, double nats) {
-  const std::string option =
-      fmt::format("pose-unit {},{}", unit.metres ? "m" : "mm", unit.degrees ? "deg" : "rad");
-  return {"pose_unit",
-          nats,
-          fmt::format("the sensor's poses are in {}: import them with `{}`",
-                      unit.metres && unit.degrees ? "metres and degrees"
-                      : unit.metres               ? "metres"
-                                                  : "degrees",
-                      option),
-          {option}};
-}
-
 /// Poses in degrees or metres.
-void check_units(SetupJudge& judge, Setup& setup, double& nats,
-                 std::vector<SetupFinding>& findings) {
+void check_units(SetupSearch& search) {
   std::optional<PoseUnit> best;
   double gain = least_nats;
-  for (const PoseUnit& unit : possible_units(judge, setup)) {
-    if (const double gained = judge.nats(unit.of(setup)) - nats; gained > gain) {
+  for (const PoseUnit& unit : possible_units(search.judge, search.setup)) {
+    const double gained = search.judge.nats(unit.of(search.setup)) - search.nats;
+    if (gained > gain) {
       best = unit;
       gain = gained;
     }
   }
-  if (best) {
-    findings.push_back(unit_finding(*best, gain));
-    setup = best->of(setup);
-    nats += gain;
+  if (!best) {
+    return;
   }
+  const auto [metres, degrees] = *best;
+  const std::string option =
+      fmt::format("pose-unit {},{}", metres ? "m" : "mm", degrees ? "deg" : "rad");
+  search.check.findings.push_back(
+      {"pose_unit",
+       gain,
+       fmt::format("the sensor's poses are in {}{}{}: import them with `{}`",
+                   metres ? "metres" : "", metres && degrees ? " and " : "",
+                   degrees ? "degrees" : "", option),
+       {option}});
+  search.setup = best->of(search.setup);
+  search.nats += gain;
 }
 
 /// Whether the touches are, but for a part of the array's reach, at one place and angle. Any array
@@ -101,85 +93,46 @@ bool at_one_place(const SetupJudge& judge, const Setup& setup) {
   for (const auto& [object, touches] : judge.touches()) {
     BoundingBox places;
     for (const TriedTouch& given : touches) {
-      places.take_in(setup.mm * given.touch.T_robot_sensor.translation_mm);
+      places.take_in(setup.pose_of(given).translation_mm);
     }
     widest_mm = std::max(widest_mm, places.diagonal());
   }
-  return widest_mm < part * array_reach_mm(setup.elements_mm) &&
-         likeness_of_angles(judge, setup.rad) > one_angle;
+  return widest_mm < part * array_reach_mm(setup.elements_mm) && at_one_angle(judge, setup.rad);
 }
 
-/// The array anywhere in the tool, in every unit and order that a turn of the array does not make.
-void search_widely(SetupJudge& judge, Setup& setup, SetupCheck& check) {
+/// The best mount of the array anywhere in the tool, in every unit and order that a turn of the
+/// array does not make; the given one where all touches are at one angle.
+Pose mount_found_widely(const SetupJudge& judge, const Setup& setup) {
   std::vector<PoseUnit> units = possible_units(judge, setup);
   units.insert(units.begin(), PoseUnit());
-  const std::vector<ElementOrder> orders = orders_but_for_turns(setup.elements_mm);
-  struct Found {
-    PoseUnit unit;
-    ElementOrder order;
-    FoundMount mount;
-  };
-  std::optional<Found> best;
+  std::optional<Summit<Pose>> best;
   for (const PoseUnit& unit : units) {
-    for (const ElementOrder& order : orders) {
+    for (const ElementOrder& order : orders_but_for_turns(setup.elements_mm)) {
       Setup tried = unit.of(setup);
       tried.elements_mm = order.elements_mm;
-      if (likeness_of_angles(judge, tried.rad) > one_angle) {
+      if (at_one_angle(judge, tried.rad)) {
         continue;
       }
-      const FoundMount mount = search_mount(judge, tried);
-      if (!best || mount.nats - best->mount.nats > least_share * std::abs(best->mount.nats)) {
-        best = {unit, order, mount};
+      const Summit<Pose> found = search_mount(judge, tried);
+      if (!best || found.value - best->value > least_share * std::abs(best->value)) {
+        best = found;
       }
     }
   }
-  if (!best) {
-    return;
-  }
-  const auto placed_best = [&](Setup at) {
-    for (glm::dvec2& p : at.elements_mm) {
-      p = best->mount.offset * p;
-    }
-    return judge.nats(at);
-  };
-  Setup found = best->unit.of(setup);
-  found.elements_mm = best->order.elements_mm;
-  double nats = placed_best(found);
-  if (best->unit.metres || best->unit.degrees) {
-    Setup as_given = setup;
-    as_given.elements_mm = found.elements_mm;
-    check.findings.push_back(unit_finding(best->unit, nats - placed_best(as_given)));
-  }
-  if (!best->order.options.empty()) {
-    Setup as_given = found;
-    as_given.elements_mm = setup.elements_mm;
-    check.findings.push_back(order_finding(best->order.options, nats - placed_best(as_given)));
-  }
-  setup = found;
-  nats = judge.nats(setup);
-  check_offset(judge, setup, nats, check, best->mount.offset);
-  check_pitch(judge, setup, nats, check);
-}
-
-SetupFinding unexplained(const SetupFit& fit) {
-  return {"unexplained", 0.0,
-          fmt::format("nothing that was tried explains these touches: {} of {} do not fit the map "
-                      "of the others; look at the clock of the poses (`pose-delay`), whether "
-                      "every pose is that of its touch, at the signs of x, y and the angle, where "
-                      "the array is mounted, and whether an object moved or was changed",
-                      fit.misfits, fit.touches)};
+  return best ? best->place : Pose{};
 }
 
 /// Elements that always, or never, read contact, against what their places predict.
-void check_elements(SetupJudge& judge, Setup& setup, SetupCheck& check) {
+void check_elements(SetupSearch& search) {
+  Setup& setup = search.setup;
   struct Element {
     std::size_t contacts = 0;
     std::size_t known = 0;
     double surprise = 0.0;  ///< above what is expected, in nats
   };
   std::vector<Element> elements(setup.elements_mm.size());
-  judge.visit(setup, [&](const TriedTouch& given, const Touch& touch, const OccupancyGrid& map) {
-    const MapLikelihood likelihood(map, judge.contact());
+  const auto add = [&](const TriedTouch& given, const Touch& touch, const OccupancyGrid& map) {
+    const MapLikelihood likelihood(map, search.judge.contact());
     for (std::size_t e = 0; e < given.readings.size(); ++e) {
       if (given.readings[e] == Reading::unknown) {
         continue;
@@ -193,7 +146,8 @@ void check_elements(SetupJudge& judge, Setup& setup, SetupCheck& check) {
       ++elements[e].known;
       elements[e].surprise += share * yes + (1.0 - share) * no - (contact ? yes : no);
     }
-  });
+  };
+  search.judge.visit(setup, add);
   setup.valid.assign(elements.size(), 1);
   for (const bool stuck : {false, true}) {
     std::vector<std::size_t> found;
@@ -209,7 +163,7 @@ void check_elements(SetupJudge& judge, Setup& setup, SetupCheck& check) {
     }
     if (!found.empty()) {
       const std::string option = fmt::format("dead {}", fmt::join(found, ","));
-      check.findings.push_back(
+      search.check.findings.push_back(
           {stuck ? "stuck_elements" : "dead_elements",
            nats,
            fmt::format("{} contact in every touch, on the object or beside it: "
@@ -221,42 +175,33 @@ void check_elements(SetupJudge& judge, Setup& setup, SetupCheck& check) {
 }
 
 /// Touches that fit the map of the others far worse than all else.
-void check_touches(SetupJudge& judge, Setup& setup, SetupCheck& check) {
+void check_touches(SetupSearch& search) {
   constexpr double least_z = -6.0;
   std::map<std::string, std::vector<std::size_t>> found;
   double nats = 0.0;
   std::set<const TriedTouch*> left_out;
-  judge.visit(setup, [&](const TriedTouch& given, const Touch& touch, const OccupancyGrid& map) {
-    const std::optional<Fit> fit = fit_of({&touch, 1}, {}, map, judge.contact());
+  const auto judged = [&](const TriedTouch& given, const Touch& touch, const OccupancyGrid& map) {
+    const std::optional<Fit> fit = fit_of({&touch, 1}, {}, map, search.judge.contact());
     if (fit && fit->z < least_z) {
       found[given.recording].push_back(given.index);
       nats -= fit->z;
       left_out.insert(&given);
     }
-    check.touches += 1;
-  });
-  if (left_out.empty() || 4 * left_out.size() > check.touches) {  // so many are the set-up's
+    search.check.touches += 1;
+  };
+  search.judge.visit(search.setup, judged);
+  if (left_out.empty() || 4 * left_out.size() > search.check.touches) {  // so many are the set-up's
     return;
   }
-  setup.left_out = std::move(left_out);
+  search.setup.left_out = std::move(left_out);
   for (auto& [recording, indices] : found) {
     std::ranges::sort(indices);
-    check.findings.push_back(
+    search.check.findings.push_back(
         {"contradicting", nats,
          fmt::format("{}: touches that contradict the others: {}; the object moved, or their poses "
                      "are others: leave them out",
                      recording, fmt::join(indices, ", "))});
   }
-}
-
-/// Every so many touches of a recording, so that there are at most `most`.
-Recording thinned(const Recording& recording, std::size_t limit) {
-  ObjectTouches few{recording.object, {}};
-  const std::size_t every = (recording.size() + limit - 1) / limit;
-  for (std::size_t i = 0; i < recording.size(); i += every) {
-    few.touches.push_back(recording.touch(i));
-  }
-  return gathered(few, recording.pressure_unit);
 }
 
 /// What the recordings' logs showed.
@@ -271,6 +216,60 @@ std::vector<SetupFinding> findings_of_logs(std::span<const Recording> recordings
   return findings;
 }
 
+/// What is found in a search that begins at a set-up, and how the touches fit in the one it ends
+/// at.
+std::pair<SetupCheck, SetupFit> checked(SetupJudge& judge, const Setup& setup) {
+  SetupSearch search{judge, setup};
+  check_units(search);
+  if (at_one_place(judge, search.setup)) {
+    search.check.remarks.emplace_back(
+        "all touches of an object are at nearly one place and angle of the sensor, which tells "
+        "nothing of the array: move and turn the sensor between the touches");
+  } else {
+    check_order(search);
+    check_offset(search);
+    check_pitch(search);
+  }
+  check_elements(search);
+  check_touches(search);
+  search.check.elements_mm = search.setup.mounted_mm();
+  return {std::move(search.check), judge.fit(search.setup)};
+}
+
+SetupCheck checked_widely(SetupJudge& judge, const Setup& given,
+                          const std::function<void(double)>& progress) {
+  SetupCheck check;
+  SetupFit fit;
+  const auto is_sound_from = [&](const Setup& setup) {
+    std::tie(check, fit) = checked(judge, setup);
+    return fit.is_sound(!check.findings.empty());
+  };
+  if (is_sound_from(given) || at_one_place(judge, given)) {
+    return check;
+  }
+  if (progress) {
+    progress(0.5);
+  }
+  Setup mounted = given;
+  mounted.mount = mount_found_widely(judge, given);
+  if (!is_sound_from(mounted)) {
+    check.findings = {
+        {"unexplained", 0.0,
+         fmt::format("nothing that was tried explains these touches: {} of {} do not fit the map "
+                     "of the others; look at the clock of the poses (`pose-delay`), whether "
+                     "every pose is that of its touch, at the signs of x, y and the angle, where "
+                     "the array is mounted, and whether an object moved or was changed",
+                     fit.misfits, fit.touches)}};
+    check.elements_mm = given.elements_mm;
+  }
+  return check;
+}
+
+/// Whether all touches of a recording have this array.
+bool has_array(const Recording& recording, const std::vector<glm::dvec2>& elements_mm) {
+  return elements_mm.size() == recording.elements() && recording.elements_mm == elements_mm;
+}
+
 }  // namespace
 
 std::optional<SetupFinding> suspected_order(Device& device, std::span<const Recording> recordings,
@@ -278,99 +277,56 @@ std::optional<SetupFinding> suspected_order(Device& device, std::span<const Reco
   constexpr std::size_t most_objects = 3;
   constexpr std::size_t least_touches = 20;
   constexpr std::size_t most_touches = 40;
+  const Setup setup{.elements_mm = recordings.front().elements_mm};
   std::vector<Recording> few;
   for (const Recording& recording : recordings) {
-    const bool fits = recording.size() >= least_touches &&
-                      recording.elements_mm.size() == recording.elements() &&
-                      recording.elements_mm == recordings.front().elements_mm;
-    if (fits && few.size() < most_objects) {
-      few.push_back(thinned(recording, most_touches));
+    if (recording.size() >= least_touches && has_array(recording, setup.elements_mm) &&
+        few.size() < most_objects) {
+      few.push_back(recording);
     }
   }
   if (few.empty()) {
     return {};
   }
-  SetupCheck check;
-  Setup setup{.elements_mm = few.front().elements_mm};
   try {
-    SetupJudge judge(device, few, options);
+    SetupJudge judge(device, few, options, most_touches);
+    SetupSearch search{judge, setup};
     if (!at_one_place(judge, setup)) {
-      double nats = judge.nats(setup);
-      check_order(judge, setup, nats, check);
+      check_order(search);
     }
+    return search.check.findings.empty() ? std::nullopt
+                                         : std::optional(search.check.findings.front());
   } catch (const Error& error) {
     if (error.fault() != Fault::input) {
       throw;
     }
+    return {};
   }
-  return check.findings.empty() ? std::nullopt : std::optional(check.findings.front());
 }
 
 SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
                        const MapOptions& options, const std::function<void(double)>& progress) {
+  const Setup given{.elements_mm = recordings.front().elements_mm};
   for (const Recording& recording : recordings) {
-    if (recording.elements_mm.size() != recording.elements() ||
-        recording.elements_mm != recordings.front().elements_mm) {
+    if (!has_array(recording, given.elements_mm)) {
       throw Error(Fault::input,
                   fmt::format("{}: its array is not that of all touches; check recordings of one "
                               "array that does not change",
                               recording.path));
     }
   }
-  const auto show = Progress(1.0, progress).part(1.0);
-  const Setup given{.elements_mm = recordings.front().elements_mm};
-  SetupCheck check{.elements_mm = given.elements_mm};
   const std::vector<SetupFinding> logged = findings_of_logs(recordings);
-  std::optional<SetupJudge> some_judge;
+  SetupCheck check{.elements_mm = given.elements_mm};
   try {
-    some_judge.emplace(device, recordings, options);
+    SetupJudge judge(device, recordings, options);
+    check = checked_widely(judge, given, progress);
   } catch (const Error& error) {
     if (error.fault() != Fault::input || logged.empty()) {
       throw;
     }
     // What is wrong with the logs may be why there are few touches.
-    check.findings = logged;
     check.remarks.emplace_back(error.what());
-    return check;
   }
-  SetupJudge& judge = *some_judge;
-  Setup setup = given;
-  SetupFit fit;
-  const auto judged = [&] {
-    check_elements(judge, setup, check);
-    check_touches(judge, setup, check);
-    fit = judge.fit(setup);
-    return fit.is_sound(!check.findings.empty());
-  };
-  double nats = judge.nats(setup);
-  check_units(judge, setup, nats, check.findings);
-  show(0.1);
-  const bool moved = !at_one_place(judge, setup);
-  if (!moved) {
-    check.remarks.emplace_back(
-        "all touches of an object are at nearly one place and angle of the sensor, which tells "
-        "nothing of the array: move and turn the sensor between the touches");
-  } else {
-    check_order(judge, setup, nats, check);
-    show(0.2);
-    check_offset(judge, setup, nats, check);
-    show(0.4);
-    check_pitch(judge, setup, nats, check);
-  }
-  show(0.5);
-  if (!judged() && moved) {
-    check = {.remarks = std::move(check.remarks)};
-    setup = given;
-    search_widely(judge, setup, check);
-    show(0.9);
-    if (!judged()) {
-      check = {.findings = {unexplained(fit)},
-               .remarks = std::move(check.remarks),
-               .touches = check.touches};
-      setup = given;
-    }
-  }
-  check.elements_mm = setup.elements_mm;
   check.findings.insert(check.findings.end(), logged.begin(), logged.end());
   return check;
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -13,6 +14,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "learning/local_search.hpp"
 #include "learning/press.hpp"
 #include "learning/setup_check.hpp"
 #include "palpate/contact_model.hpp"
@@ -21,23 +23,27 @@
 
 namespace palpate {
 
-struct TriedTouch;
-
-/// How the touches are tried.
-struct Setup {
-  std::vector<glm::dvec2> elements_mm;   ///< [e] in the order of the readings
-  double mm = 1.0;                       ///< that the poses' unit of length has
-  double rad = 1.0;                      ///< that the poses' unit of angle has
-  std::vector<std::uint8_t> valid = {};  ///< [e] 0: dead, whatever the recording says; empty: none
-  std::set<const TriedTouch*> left_out = {};
-};
-
 /// A touch in contact, and where it stands.
 struct TriedTouch {
   Touch touch;
   std::vector<Reading> readings;  ///< [e] whatever the set-up is
   std::string recording;
   std::size_t index = 0;  ///< in the recording
+};
+
+/// How the touches are tried.
+struct Setup {
+  std::vector<glm::dvec2> elements_mm;   ///< [e] in the order of the readings
+  Pose mount = {};                       ///< of the array in the frame of its elements
+  double mm = 1.0;                       ///< that the poses' unit of length has
+  double rad = 1.0;                      ///< that the poses' unit of angle has
+  std::vector<std::uint8_t> valid = {};  ///< [e] 0: dead, whatever the recording says; empty: none
+  std::set<const TriedTouch*> left_out = {};
+
+  /// The elements where the mount has them.
+  std::vector<glm::dvec2> mounted_mm() const;
+  /// T_robot_sensor of a touch in mm and rad.
+  Pose pose_of(const TriedTouch& given) const;
 };
 
 /// How touches fit maps that they are no part of.
@@ -62,9 +68,11 @@ class SetupJudge {
                                   const OccupancyGrid& map_of_the_others)>;
 
   /// @param recordings outlive this object
+  /// @param most_touches of each that count, evenly chosen
   /// @throws Error where an object has fewer than four touches in contact, or all elements are in
   /// contact in all touches
-  SetupJudge(Device& device, std::span<const Recording> recordings, const MapOptions& options);
+  SetupJudge(Device& device, std::span<const Recording> recordings, const MapOptions& options,
+             std::size_t most_touches = std::numeric_limits<std::size_t>::max());
 
   /// Log-likelihood of all readings (Eq. 7), in nats; -1e300 where the touches lie so far apart
   /// that no map holds them.
@@ -92,10 +100,8 @@ class SetupJudge {
 /// Nats that a finding needs. Of sound set-ups none came near it; see tests/learning.
 inline constexpr double least_nats = 12.0;
 
-/// Length of the mean of unit vectors at the sensor's angles: 1 where all are alike.
-double likeness_of_angles(const SetupJudge& judge, double rad);
-/// From this likeness on, angles count as one.
-inline constexpr double one_angle = 0.97;
+/// Whether the sensor's angles, in a unit of so many rad, are nearly one.
+bool at_one_angle(const SetupJudge& judge, double rad);
 
 /// Where the array sits in the tool, as "array_offset", by Eq. 7 of touches at known poses of
 /// objects whose map is drawn. None without any, or where it sits as its elements are said to be.
@@ -114,35 +120,30 @@ struct ElementOrder {
 /// The order as given, without options, and those of a full grid that no turn of an array makes.
 std::vector<ElementOrder> orders_but_for_turns(std::span<const glm::dvec2> elements_mm);
 
-/// The finding "element_order" of these options.
-SetupFinding order_finding(const std::vector<std::string>& options, double nats);
-
 /// Where an order costs less than this part of all that touches tell, it is not told from others.
 inline constexpr double least_share = 0.05;
 
-/// Where an array seems to sit in the tool.
-struct FoundMount {
-  Pose offset;  ///< of the array in the frame of its elements
-  /// Log-probability of all readings, of which those in one square of all touches of an object are
-  /// one Beta-distributed share of contact: to be compared between set-ups of one length.
-  double nats = 0.0;
+/// The mount under which the touches agree best, within 60 mm and at any angle, coarse to fine to
+/// about a millimetre and 2 degrees; its value is to be compared between set-ups of one length.
+/// Makes no map; takes all host threads.
+Summit<Pose> search_mount(const SetupJudge& judge, const Setup& setup);
+
+/// The likeliest set-up so far, and what was found on the way. Each check_...() adds its finding,
+/// if any, and goes on from the set-up that the finding mends.
+struct SetupSearch {
+  SetupJudge& judge;
+  Setup setup;
+  double nats = judge.nats(setup);
+  SetupCheck check = {};
 };
 
-/// The mount under which the touches agree best, within 60 mm and at any angle, coarse to fine to
-/// about a millimetre and 2 degrees. Makes no map; takes all host threads.
-/// @param setup its elements are those that the mount moves
-FoundMount search_mount(const SetupJudge& judge, const Setup& setup);
-
-// Each adds its finding, if any, to the check, and goes on from the set-up that it mends.
-
 /// The order of the elements that explains the touches better.
-void check_order(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check);
+void check_order(SetupSearch& search);
 
 /// Where the array sits in the tool, as "array_offset".
-void check_offset(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check,
-                  const Pose& start = {});
+void check_offset(SetupSearch& search);
 
 /// How far apart the elements are.
-void check_pitch(SetupJudge& judge, Setup& setup, double& nats, SetupCheck& check);
+void check_pitch(SetupSearch& search);
 
 }  // namespace palpate

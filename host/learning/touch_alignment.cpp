@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "learning/local_search.hpp"
 #include "learning/progress.hpp"
@@ -22,25 +23,21 @@ namespace {
 /// x and y in mm and an angle in rad.
 Pose pose_of(const glm::dvec3& at) { return {{at.x, at.y}, at.z}; }
 
-/// Points about a centre, equally far apart along each axis: `steps` to either side.
-struct Grid {
-  glm::dvec3 centre{0.0};
-  glm::dvec3 half{0.0};  ///< 0: one point along this axis
-  int steps = 0;
-};
-
-/// The mean and variance of a displacement under prior times likelihood, over the points of a grid.
+/// The mean and variance of a displacement under prior times likelihood, over a grid about a
+/// centre.
+/// @param half of the grid's edges; 0: one point along this axis
+/// @param steps to either side
 template <typename LogLikelihood>
-Moments moments(const Grid& grid, const glm::dvec3& prior_sd, const LogLikelihood& log_likelihood) {
+Moments moments(const glm::dvec3& centre, const glm::dvec3& half, int steps,
+                const DisplacementSd& sd, const LogLikelihood& log_likelihood) {
+  const glm::dvec3 prior_sd{sd.mm, sd.mm, sd.rad};
   std::vector<std::pair<glm::dvec3, double>> points;
-  const auto steps = [&](double half) { return half > 0.0 ? grid.steps : 0; };
-  visit_grid({steps(grid.half.x), steps(grid.half.y), steps(grid.half.z)},
+  visit_grid(steps * glm::ivec3(glm::greaterThan(half, glm::dvec3(0.0))),
              [&](const glm::dvec3& index) {
-               const glm::dvec3 at = grid.centre + grid.half * index / (1.0 * grid.steps);
+               const glm::dvec3 at = centre + half * index / (1.0 * steps);
                double nats = 0.0;
                for (int k = 0; k < 3; ++k) {
-                 const double z = prior_sd[k] > 0.0 ? at[k] / prior_sd[k] : 0.0;
-                 nats -= 0.5 * z * z;
+                 nats -= prior_sd[k] > 0.0 ? 0.5 * std::pow(at[k] / prior_sd[k], 2.0) : 0.0;
                }
                points.emplace_back(at, nats + log_likelihood(pose_of(at)));
              });
@@ -50,16 +47,15 @@ Moments moments(const Grid& grid, const glm::dvec3& prior_sd, const LogLikelihoo
 /// The posterior of a displacement: over the prior's width, then about what is found there.
 template <typename LogLikelihood>
 Moments posterior(const DisplacementSd& sd, const LogLikelihood& log_likelihood) {
-  constexpr double reach = 2.4;       // in standard deviations
+  constexpr double reach = 2.4;  // in standard deviations
+  constexpr int steps = 4;
+  constexpr int near_steps = 3;
   constexpr double least_step = 0.2;  // of the wide grid's: it tells no smaller deviation
-  const glm::dvec3 prior_sd{sd.mm, sd.mm, sd.rad};
-  const Grid prior_grid{.half = reach * prior_sd, .steps = 4};
-  const Moments rough = moments(prior_grid, prior_sd, log_likelihood);
-  Grid near_grid{.centre = rough.mean, .steps = 3};
-  near_grid.half =
-      glm::max(2.0 * glm::sqrt(rough.variance),
-               near_grid.steps * least_step * (prior_grid.half / (1.0 * prior_grid.steps)));
-  return moments(near_grid, prior_sd, log_likelihood);
+  const glm::dvec3 half = reach * glm::dvec3(sd.mm, sd.mm, sd.rad);
+  const Moments rough = moments({}, half, steps, sd, log_likelihood);
+  const glm::dvec3 near_half =
+      glm::max(2.0 * glm::sqrt(rough.variance), near_steps * least_step * half / (1.0 * steps));
+  return moments(rough.mean, near_half, near_steps, sd, log_likelihood);
 }
 
 /// Moves all poses by the one rigid motion that brings them nearest to the reported ones, weighed
@@ -172,9 +168,8 @@ PredictiveMap::PredictiveMap(std::span<const Touch> touches, const MapOptions& o
   for (const Touch& touch : touches) {
     Touch in_sensor_frame = touch;
     in_sensor_frame.T_robot_sensor = {};
-    Part& part = touches_.emplace_back();
-    part.known = known_readings(in_sensor_frame, options.classifier);
-    for (const ElementReading& element : part.known) {
+    known_.push_back(known_readings(in_sensor_frame, options.classifier));
+    for (const ElementReading& element : known_.back()) {
       box.take_in(touch.T_robot_sensor * element.position_mm);
     }
   }
@@ -192,26 +187,22 @@ PredictiveMap::PredictiveMap(std::span<const Touch> touches, const MapOptions& o
   }
   log_odds_.assign(static_cast<std::size_t>(cells_.nx * cells_.ny),
                    log_odds_from_probability(options.sensor.prior));
+  T_robot_sensor_.resize(touches.size());
   for (std::size_t i = 0; i < touches.size(); ++i) {
     put_in(i, touches[i].T_robot_sensor);
   }
 }
 
-void PredictiveMap::take_out(std::size_t touch) {
-  for (const auto& [cell, increment] : touches_[touch].added) {
-    log_odds_[cell] -= increment;
-  }
-  touches_[touch].added.clear();
+void PredictiveMap::put_in(std::size_t touch, const Pose& T_robot_sensor) {
+  T_robot_sensor_[touch] = T_robot_sensor;
+  add(touch, 1.0);
 }
 
-void PredictiveMap::put_in(std::size_t touch, const Pose& T_robot_sensor) {
-  Part& part = touches_[touch];
-  for (const ElementReading& element : part.known) {
-    visit_near(cells_, options_.cell_mm, T_robot_sensor * element.position_mm, radius_mm_,
+void PredictiveMap::add(std::size_t touch, double times) {
+  for (const ElementReading& element : known_[touch]) {
+    visit_near(cells_, options_.cell_mm, T_robot_sensor_[touch] * element.position_mm, radius_mm_,
                [&](std::size_t cell, double squared) {
-                 const double nats = increment(element.reading, squared);
-                 log_odds_[cell] += nats;
-                 part.added.emplace_back(cell, nats);
+                 log_odds_[cell] += times * increment(element.reading, squared);
                });
   }
 }
@@ -229,7 +220,7 @@ double PredictiveMap::log_likelihood(std::size_t touch, const Pose& T_robot_sens
   const glm::dvec2 x = rotate(T_robot_sensor.theta_rad, {1.0, 0.0});
   const glm::dvec2 y{-x.y, x.x};
   double sum = 0.0;
-  for (const ElementReading& element : touches_[touch].known) {
+  for (const ElementReading& element : known_[touch]) {
     const glm::dvec2 p =
         T_robot_sensor.translation_mm + element.position_mm.x * x + element.position_mm.y * y;
     sum += contact_.log_likelihood(element.reading, {log_odds(p)});

@@ -4,13 +4,12 @@
 #include <cstddef>
 #include <functional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "model/cell_range.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/map_builder.hpp"
+#include "palpate/pose.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {
@@ -52,23 +51,20 @@ class PredictiveMap {
   /// @throws Error on a touch that is not sound, and as cover() does
   PredictiveMap(std::span<const Touch> touches, const MapOptions& options);
 
-  void take_out(std::size_t touch);
+  void take_out(std::size_t touch) { add(touch, -1.0); }
   void put_in(std::size_t touch, const Pose& T_robot_sensor);
   /// Log-likelihood (Eq. 7) of the touch's readings at this pose, in nats.
   double log_likelihood(std::size_t touch, const Pose& T_robot_sensor) const;
 
  private:
-  struct Part {
-    std::vector<ElementReading> known;                  ///< in the sensor frame
-    std::vector<std::pair<std::size_t, double>> added;  ///< to these cells, in nats
-  };
-
+  void add(std::size_t touch, double times);
   double increment(Reading reading, double squared_mm) const;
   double log_odds(const glm::dvec2& p_robot_mm) const;
 
   MapOptions options_;
   ContactModel contact_;
-  std::vector<Part> touches_;
+  std::vector<std::vector<ElementReading>> known_;  ///< [touch] in the sensor frame
+  std::vector<Pose> T_robot_sensor_;                ///< [touch] where it is, or was, in the map
   double radius_mm_ = 0.0;
   /// [contact or none] nats at equally spaced squares of the distance, up to the radius's.
   std::array<std::vector<double>, 2> increments_;

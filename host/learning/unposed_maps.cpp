@@ -23,9 +23,15 @@ struct UnposedPress {
   std::size_t index = 0;         ///< into the presses given
   std::vector<PressSide> sides;  ///< as it is and, where asked for, mirrored
   OccupancyGrid image;           ///< observed_map(), in the robot frame of the first side
-
-  double reach_mm() const { return sides.front().reach_mm(); }
 };
+
+double largest_reach_mm(std::span<const UnposedPress> presses) {
+  double reach_mm = 0.0;
+  for (const UnposedPress& press : presses) {
+    reach_mm = std::max(reach_mm, press.sides.front().reach_mm);
+  }
+  return reach_mm;
+}
 
 /// The map that a press is a part of, and its place there.
 struct PressHome {
@@ -53,17 +59,15 @@ class PressFusion {
         options_(options),
         step_mm_(step_mm),
         report_(Progress(1.0, progress).part(1.0)),
-        search_(options.contact, step_mm,
-                std::ranges::max_element(presses, {}, &UnposedPress::reach_mm)->reach_mm(),
-                options.temperature),
+        search_(options.contact, step_mm, largest_reach_mm(presses), options.temperature),
         own_gain_(presses.size()),
         contact_gain_(presses.size()),
         homes_(presses.size()) {
     tbb::parallel_for(std::size_t{0}, presses.size(), [&](std::size_t p) {
       const PressSide& press = presses_[p].sides.front();
       const Hypothesis own = single_map(p);
-      own_gain_[p] = search_.gain(press.evidence(), own, {});
-      contact_gain_[p] = search_.gain(press.contact(), own, {});
+      own_gain_[p] = search_.gain(press.evidence, own, {});
+      contact_gain_[p] = search_.gain(press.contact, own, {});
     });
   }
 
@@ -94,12 +98,11 @@ class PressFusion {
   UnposedMaps result(const std::string& label) const {
     UnposedMaps result{.rounds = rounds_, .settled = settled_};
     for (std::size_t p = 0; p < presses_.size(); ++p) {
-      const PressHome& home = homes_[p];
-      if (!home.map) {
-        result.misfits.push_back({.press = presses_[p].index,
-                                  .reason = is_little(p, home.place) ? Misfit::Reason::too_little
-                                                                     : Misfit::Reason::unlike,
-                                  .fit = home.fit});
+      if (const PressHome& home = homes_[p]; !home.map) {
+        result.misfits.push_back(
+            {presses_[p].index, is_little(p, home.place)
+                                    ? "too little is in contact"
+                                    : fmt::format("fits no map ({:.2f})", home.fit)});
       }
     }
     for (std::size_t map = 0; map < maps_.size(); ++map) {
@@ -128,7 +131,7 @@ class PressFusion {
       if (home.map != map) {
         continue;
       }
-      Touch touch = presses_[p].sides[home.place.mirrored ? 1 : 0].touch();
+      Touch touch = presses_[p].sides[home.place.mirrored ? 1 : 0].touch;
       touch.T_robot_sensor = home.place.T_object_robot * touch.T_robot_sensor;
       sums.add(observed_map(std::span(&touch, 1), options_.map, label), {.weight = home.weight()});
       result.presses.push_back({.press = presses_[p].index,
@@ -264,7 +267,7 @@ class PressFusion {
       const Hypothesis hypothesis = compared(maps_[map].sums);
       PressPlace place = search_.best_place(sides, hypothesis);
       if (before.map == map && before.place.mirrored == place.mirrored) {
-        const double gain = search_.gain(sides[place.mirrored ? 1 : 0].evidence(), hypothesis,
+        const double gain = search_.gain(sides[place.mirrored ? 1 : 0].evidence, hypothesis,
                                          before.place.T_object_robot);
         if (gain > place.gain - clear_gain) {
           place.T_object_robot = before.place.T_object_robot;
@@ -368,10 +371,10 @@ UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& labe
     if (options.mirror) {
       press.sides.emplace_back(presses[i], options.contact, true);
     }
-    if (press.sides.front().in_contact()) {
+    if (press.sides.front().evidence.front().in_contact()) {
       placeable.push_back(std::move(press));
     } else {
-      untouched.push_back({.press = i, .reason = Misfit::Reason::no_contact});
+      untouched.push_back({i, "nothing is in contact"});
     }
   }
   if (placeable.empty()) {
@@ -381,7 +384,7 @@ UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& labe
   }
   tbb::parallel_for(std::size_t{0}, placeable.size(), [&](std::size_t p) {
     placeable[p].image =
-        observed_map(std::span(&placeable[p].sides.front().touch(), 1), options.map, label);
+        observed_map(std::span(&placeable[p].sides.front().touch, 1), options.map, label);
   });
   PressFusion fusion(placeable, options, step_mm, progress);
   fusion.run();

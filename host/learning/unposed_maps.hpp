@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "palpate/contact_model.hpp"
+#include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "palpate/reading_layer.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {
@@ -47,14 +47,8 @@ struct UnposedMap {
 
 /// A press that is a part of no map.
 struct Misfit {
-  enum class Reason {
-    no_contact,  ///< no element is In Contact
-    too_little,  ///< its contact is too small for a place to stand out from all others
-    unlike,      ///< it fits none of the maps
-  };
   std::size_t press = 0;
-  Reason reason = Reason::unlike;
-  double fit = 0.0;  ///< the best one
+  std::string reason;  ///< in words
 };
 
 struct UnposedMaps {

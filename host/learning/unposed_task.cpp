@@ -63,36 +63,19 @@ std::string fit_words(const UnposedMap& map) {
                      map.presses.size(), sum / static_cast<double>(map.presses.size()), least);
 }
 
-std::string words_of(const Misfit& misfit) {
-  switch (misfit.reason) {
-    case Misfit::Reason::no_contact:
-      return "nothing is in contact";
-    case Misfit::Reason::too_little:
-      return "too little is in contact";
-    case Misfit::Reason::unlike:
-      break;
-  }
-  return fmt::format("fits no map ({:.2f})", misfit.fit);
-}
-
 /// Says which older maps of the label `recognize` would read besides the new ones.
 void warn_of_older_maps(const MapRequest& request, const std::string& label, std::size_t count,
                         std::vector<std::string>& remarks) {
-  const auto warn = [&](const std::string& name) {
-    std::error_code ignored;
-    const std::filesystem::path path = request.map_file(name);
-    const bool exists = std::filesystem::exists(path, ignored);
-    if (exists) {
+  constexpr std::size_t most_looked_for = 99;
+  for (std::size_t map = 0; map <= most_looked_for; ++map) {  // 0: the only one of its label
+    const bool is_new = count == 1 ? map == 0 : map > 0 && map <= count;
+    const std::filesystem::path file =
+        request.map_file(map == 0 ? label : name_of(label, map - 1, count + 1));
+    if (std::error_code ignored; !is_new && std::filesystem::exists(file, ignored)) {
       remarks.push_back(
           fmt::format("{}: an older map of '{}'; remove it, or `maps {}` reads it, too",
-                      path.string(), label, request.output));
+                      file.string(), label, request.output));
     }
-    return exists;
-  };
-  if (count > 1) {
-    warn(label);
-  }
-  for (std::size_t map = count == 1 ? 0 : count; warn(name_of(label, map, map + 2)); ++map) {
   }
 }
 
@@ -122,7 +105,7 @@ void add_object(const MapTask& task, std::size_t object, UnposedMaps made, Learn
   for (const Misfit& misfit : made.misfits) {
     const TouchSource& source = sources[misfit.press];
     learned.words.push_back(
-        fmt::format("{}: press {} left out: {}", source.path, source.index, words_of(misfit)));
+        fmt::format("{}: press {} left out: {}", source.path, source.index, misfit.reason));
   }
   if (!made.settled) {
     learned.words.push_back(fmt::format("{}: presses still moved after {} rounds; look at the maps",

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <initializer_list>
+#include <iterator>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -13,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <nanobind/ndarray.h>
 #include <glm/vec2.hpp>
 
@@ -30,7 +33,7 @@ template <typename Value>
 struct Array {
   nb::object object;  ///< keeps the memory alive
   const Value* data = nullptr;
-  std::vector<std::size_t> shape;
+  std::vector<std::size_t> shape = {0};
 
   std::size_t size() const {
     return std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies());
@@ -55,10 +58,20 @@ struct Array {
 using Floats = Array<double>;
 using Bytes = Array<std::uint8_t>;
 
-/// Reads the array in place. Throws what Python raises where it is of other values, which may have
-/// been made so in place, or its layout is not C's.
+/// Reads the array in place. Throws TypeError where it is of other values, which may have been made
+/// so in place, or its layout is not C's.
 template <typename Value>
-Array<Value> in_place(nb::object array, const char* name);
+Array<Value> in_place(nb::object array, const char* name) {
+  nb::ndarray<const Value, nb::c_contig, nb::device::cpu> read;
+  if (!nb::try_cast(array, read, /*convert=*/false)) {
+    throw nb::type_error(fmt::format("{}: was given another dtype or layout", name).c_str());
+  }
+  std::vector<std::size_t> shape;
+  for (std::size_t axis = 0; axis < read.ndim(); ++axis) {
+    shape.push_back(read.shape(axis));
+  }
+  return {std::move(array), read.data(), std::move(shape)};  // the array keeps the memory
+}
 
 /// Takes the arrays of one call, whose extents have to agree: palpate._arrays.Reader in C++.
 class ArrayReader {
@@ -93,11 +106,19 @@ class ArrayReader {
 };
 
 /// A pose (x_mm, y_mm, theta_rad), or a point (x_mm, y_mm).
-Pose pose_of(nb::handle object, const char* name);
-glm::dvec2 point_of(nb::handle object, const char* name);
+inline Pose pose_of(nb::handle given, const char* name) {
+  return ArrayReader().floats(given, name, {"3"}).copied<Pose>().front();
+}
+inline glm::dvec2 point_of(nb::handle given, const char* name) {
+  return ArrayReader().floats(given, name, {"2"}).copied<glm::dvec2>().front();
+}
 /// Poses [n, 3], points [n, 2].
-std::vector<Pose> poses_of(nb::handle object, const char* name);
-std::vector<glm::dvec2> points_of(nb::handle object, const char* name);
+inline std::vector<Pose> poses_of(nb::handle given, const char* name) {
+  return ArrayReader().floats(given, name, {"n", "3"}).copied<Pose>();
+}
+inline std::vector<glm::dvec2> points_of(nb::handle given, const char* name) {
+  return ArrayReader().floats(given, name, {"n", "2"}).copied<glm::dvec2>();
+}
 
 /// A NumPy array as the result of a function. An object, so that no policy of nanobind's asks who
 /// owns the memory: `owner` does.
@@ -164,6 +185,14 @@ inline Result<double, 2> to_array(const std::array<double, 9>& covariance) {
 }
 inline Result<double, 1> to_array(const std::array<double, 3>& values) {
   return owned(std::vector(values.begin(), values.end()));
+}
+
+/// A member, or what a function gives, of every row.
+template <typename Row, typename Member>
+auto column(const std::vector<Row>& rows, Member member) {
+  std::vector<std::decay_t<std::invoke_result_t<Member, const Row&>>> values;
+  std::ranges::transform(rows, std::back_inserter(values), member);
+  return values;
 }
 
 // Properties by the member that holds their values.

@@ -108,6 +108,12 @@ std::tuple<Lines, std::string> recognise_entries(OpenBatch& batch,
   return {std::move(lines), std::move(unresolved)};
 }
 
+/// What never changes of an open batch, as a property.
+template <typename F>
+auto of_batch(F property) {
+  return [property](const Shared<OpenBatch>& self) { return property(self.constant()); };
+}
+
 }  // namespace
 
 void bind_batch(nb::module_& module) {
@@ -130,36 +136,29 @@ void bind_batch(nb::module_& module) {
           "head"_a, "device"_a, "threads"_a,
           "Raises Error where palpate, a map, the scene or the sensor model is not as it was when\n"
           "the batch was settled.")
-      .def_prop_ro(
-          "on_host",
-          [](const Shared<OpenBatch>& self) { return !self.constant().job.task().uses_device(); },
-          "Whether bounds recognise, which compute on the host alone.")
-      .def_prop_ro(
-          "lattice",
-          [](const Shared<OpenBatch>& self) { return self.constant().recogniser.lattice(); },
-          "The bins, whose pivot is (0, 0) where it is automatic.")
-      .def_prop_ro(
-          "auto_pivot",
-          [](const Shared<OpenBatch>& self) { return self.constant().job.task().auto_pivot; },
-          "Whether theta turns about each unknown's first touch.")
-      .def_prop_ro(
-          "maps",
-          [](const Shared<OpenBatch>& self) {
-            std::vector<std::tuple<std::string, Hypothesis>> maps;
-            const RecognitionTask& task = self.constant().job.task();
-            for (std::size_t i = 0; i < task.hypotheses.size(); ++i) {
-              maps.emplace_back(task.map_paths[i], task.hypotheses[i]);
-            }
-            return maps;
-          },
-          "The maps, by their files; symmetries and mirror images are the task's.")
-      .def_prop_ro(
-          "memory_bytes",
-          [](const Shared<OpenBatch>& self) {
-            const Recogniser& recogniser = self.constant().recogniser;
-            return recogniser.filter().device_bytes() + recogniser.filter().host_bytes();
-          },
-          "Memory held: the device's, or the host's where bounds recognise.")
+      .def_prop_ro("on_host",
+                   of_batch([](const OpenBatch& open) { return !open.job.task().uses_device(); }),
+                   "Whether bounds recognise, which compute on the host alone.")
+      .def_prop_ro("lattice",
+                   of_batch([](const OpenBatch& open) { return open.recogniser.lattice(); }),
+                   "The bins, whose pivot is (0, 0) where it is automatic.")
+      .def_prop_ro("auto_pivot",
+                   of_batch([](const OpenBatch& open) { return open.job.task().auto_pivot; }),
+                   "Whether theta turns about each unknown's first touch.")
+      .def_prop_ro("maps", of_batch([](const OpenBatch& open) {
+                     std::vector<std::tuple<std::string, Hypothesis>> maps;
+                     const RecognitionTask& task = open.job.task();
+                     for (std::size_t i = 0; i < task.hypotheses.size(); ++i) {
+                       maps.emplace_back(task.map_paths[i], task.hypotheses[i]);
+                     }
+                     return maps;
+                   }),
+                   "The maps, by their files; symmetries and mirror images are the task's.")
+      .def_prop_ro("memory_bytes", of_batch([](const OpenBatch& open) {
+                     const Filter& filter = open.recogniser.filter();
+                     return filter.device_bytes() + filter.host_bytes();
+                   }),
+                   "Memory held: the device's, or the host's where bounds recognise.")
       .def(
           "recognize",
           [](const Shared<OpenBatch>& self, const std::vector<std::string>& entries) {

@@ -1,8 +1,5 @@
-#include "estimate.hpp"
-
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -12,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "model/bounding_box.hpp"
 #include "palpate/error.hpp"
@@ -25,11 +23,7 @@ namespace {
 /// (low, high) of each.
 template <typename Interval>
 std::vector<std::tuple<double, double>> pairs_of(const std::vector<Interval>& intervals) {
-  std::vector<std::tuple<double, double>> pairs;
-  for (const Interval& interval : intervals) {
-    pairs.emplace_back(interval.low, interval.high);
-  }
-  return pairs;
+  return column(intervals, [](const Interval& each) { return std::tuple(each.low, each.high); });
 }
 
 void bind_mode(nb::module_& module) {
@@ -142,11 +136,7 @@ void bind_marginals(nb::module_& module) {
 /// A number of every candidate, [n].
 template <typename Number>
 auto of_each(Number number) {
-  return [number](const TouchGains& gains) {
-    std::vector<double> numbers;
-    std::ranges::transform(gains.each, std::back_inserter(numbers), number);
-    return owned(std::move(numbers));
-  };
+  return [number](const TouchGains& gains) { return owned(column(gains.each, number)); };
 }
 
 void bind_gains(nb::module_& module) {
@@ -175,13 +165,11 @@ void bind_gains(nb::module_& module) {
 }  // namespace
 
 std::optional<Hypothesis> hypothesis_in(nb::handle item) {
-  const OccupancyGrid* map = nullptr;
-  const Hypothesis* hypothesis = nullptr;
-  if (nb::try_cast(item, map) && map != nullptr) {
-    return Hypothesis{.map = *map};
+  if (nb::isinstance<OccupancyGrid>(item)) {
+    return Hypothesis{.map = nb::cast<const OccupancyGrid&>(item)};
   }
-  return nb::try_cast(item, hypothesis) && hypothesis != nullptr ? std::optional(*hypothesis)
-                                                                 : std::nullopt;
+  return nb::isinstance<Hypothesis>(item) ? std::optional(nb::cast<Hypothesis>(item))
+                                          : std::nullopt;
 }
 
 std::vector<Hypothesis> hypotheses_of(nb::handle maps) {

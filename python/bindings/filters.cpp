@@ -11,7 +11,6 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
-#include "estimate.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
@@ -27,22 +26,15 @@ namespace {
 /// A filter over object and pose.
 template <typename Filter>
 struct Named : Shared<Filter> {
-  std::string name;        ///< "A, E, I on 'llvmpipe'"
+  std::string text;        ///< "PoseHistogram(A, E, I on 'llvmpipe')"
   double extent_mm = 0.0;  ///< farthest occupied place of any map from its object frame's origin
 };
 
-std::string name_of(const std::vector<Hypothesis>& hypotheses, const Device& device) {
-  std::vector<std::string> labels;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    labels.push_back(hypothesis.map.label);
-  }
-  return fmt::format("{} on '{}'", fmt::join(labels, ", "), device.name());
-}
-
 template <typename Filter, typename Options>
-Named<Filter> make_filter(const std::shared_ptr<Device>& device, nb::handle maps,
+Named<Filter> make_filter(const char* name, const std::shared_ptr<Device>& device, nb::handle maps,
                           const Options& options) {
   const std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
+  const auto labels = column(hypotheses, [](const Hypothesis& each) { return each.map.label; });
   auto filter = make_shared_on(device, [&](Device& on) {
     if constexpr (std::is_constructible_v<Filter, Device&, decltype(hypotheses), Options>) {
       return Filter(on, hypotheses, options);
@@ -50,7 +42,9 @@ Named<Filter> make_filter(const std::shared_ptr<Device>& device, nb::handle maps
       return Filter(hypotheses, options);
     }
   });
-  return {std::move(filter), name_of(hypotheses, *device), extent_mm(hypotheses)};
+  return {std::move(filter),
+          fmt::format("{}({} on '{}')", name, fmt::join(labels, ", "), device->name()),
+          extent_mm(hypotheses)};
 }
 
 template <typename Filter>
@@ -78,13 +72,7 @@ std::tuple<Result<std::int64_t, 1>, Result<double, 1>> likely_bins(const Named<F
   const auto likely = self.use([&](Filter& belief) {
     return belief.likely_bins(std::span(&object, 1), least_share).front();
   });
-  std::vector<std::int64_t> bins;
-  std::vector<double> shares;
-  for (const BinShare& bin : likely) {
-    bins.push_back(bin.bin);
-    shares.push_back(bin.share);
-  }
-  return {owned(std::move(bins)), owned(std::move(shares))};
+  return {owned(column(likely, &BinShare::bin)), owned(column(likely, &BinShare::share))};
 }
 
 template <typename Filter>
@@ -110,16 +98,9 @@ Result<double, 3> log_likelihood(const Histogram& self, int object) {
   return owned(std::move(bins), self.constant().lattice());
 }
 
-template <typename Filter>
-void bind_text(nb::class_<Filter> filter, const char* class_name) {
-  filter.def("__repr__", [class_name](const Filter& self) {
-    return fmt::format("{}({})", class_name, self.name);
-  });
-}
-
 /// What histogram and bounds have alike.
 template <typename Belief>
-void bind_belief(nb::class_<Named<Belief>> belief, const char* class_name) {
+void bind_belief(nb::class_<Named<Belief>> belief) {
   using Own = Named<Belief>;
   belief
       .def("refine", &refine<Belief>, "mode"_a = nb::none(),
@@ -138,8 +119,8 @@ void bind_belief(nb::class_<Named<Belief>> belief, const char* class_name) {
            "elements_mm [e, 2]: living elements in the sensor frame.")
       .def("reset", shared_method<Own>(&Belief::reset),
            "Returns to the uniform belief, for the next unknown.")
-      .def_prop_ro("lattice", shared_method<Own>(&Belief::lattice), "The bins.");
-  bind_text(belief, class_name);
+      .def_prop_ro("lattice", shared_method<Own>(&Belief::lattice), "The bins.")
+      .def("__repr__", [](const Own& self) { return self.text; });
 }
 
 void bind_histogram(nb::module_& module) {
@@ -159,7 +140,8 @@ void bind_histogram(nb::module_& module) {
                                                .none_weight = none_weight,
                                                .touch_sd = sd_of(touch_sd, "touch_sd"),
                                                .slip_sd = sd_of(slip_sd, "slip_sd")};
-                new (self) Histogram(make_filter<PoseHistogram>(device, maps, options));
+                new (self)
+                    Histogram(make_filter<PoseHistogram>("PoseHistogram", device, maps, options));
               },
               "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
               "contact"_a = ContactModel{}, "none_weight"_a = nb::none(),
@@ -177,8 +159,9 @@ void bind_histogram(nb::module_& module) {
           .def(
               "move_pivot",
               [](const Histogram& self, const ArrayLike& pivot_mm) {
-                const glm::dvec2 pivot = point_of(pivot_mm, "pivot_mm");
-                self.use([&](PoseHistogram& belief) { belief.move_pivot(pivot); });
+                self.use([pivot = point_of(pivot_mm, "pivot_mm")](PoseHistogram& belief) {
+                  belief.move_pivot(pivot);
+                });
               },
               "pivot_mm"_a,
               "Turns theta about another pivot [2], in the robot frame, before any touch.")
@@ -192,7 +175,7 @@ void bind_histogram(nb::module_& module) {
               "weights.")
           .def_prop_ro("device_bytes", shared_method<Histogram>(&PoseHistogram::device_bytes),
                        "Device memory held.");
-  bind_belief(belief, "PoseHistogram");
+  bind_belief(belief);
 }
 
 using Particles = Named<ParticleFilter>;
@@ -200,15 +183,9 @@ using Particles = Named<ParticleFilter>;
 std::tuple<Result<std::int32_t, 1>, Result<double, 2>, Result<double, 1>> particles(
     const Particles& self) {
   const auto all = self.use([](ParticleFilter& filter) { return filter.particles(); });
-  std::vector<std::int32_t> objects;
-  std::vector<Pose> poses;
-  std::vector<double> weights;
-  for (const ParticleFilter::Particle& particle : all) {
-    objects.push_back(particle.object);
-    poses.push_back(particle.T_object_robot);
-    weights.push_back(particle.weight);
-  }
-  return {owned(std::move(objects)), to_array(poses), owned(std::move(weights))};
+  return {owned(column(all, &ParticleFilter::Particle::object)),
+          to_array(column(all, &ParticleFilter::Particle::T_object_robot)),
+          owned(column(all, &ParticleFilter::Particle::weight))};
 }
 
 void bind_particles(nb::module_& module) {
@@ -216,56 +193,55 @@ void bind_particles(nb::module_& module) {
       .value("multinomial", Resampling::multinomial, "n independent draws, as in the paper")
       .value("systematic", Resampling::systematic, "one draw and n - 1 equal steps");
 
-  const auto filter =
-      nb::class_<Particles>(
-          module, "ParticleFilter",
-          "Monte Carlo localization over object identity and planar pose (Sec. III-B, Eq. 8-12).")
-          .def(
-              "__init__",
-              [](Particles* self, const std::shared_ptr<Device>& device, const MapsLike& maps,
-                 const PoseLattice& region, int count, const ContactModel& contact,
-                 double motion_mm, double motion_rad, Resampling resampling, bool augmented,
-                 double alpha_slow, double alpha_fast, std::uint64_t seed) {
-                const ParticleOptions options{.particles = count,
-                                              .region = region,
-                                              .contact = contact,
-                                              .motion_mm = motion_mm,
-                                              .motion_rad = motion_rad,
-                                              .resampling = resampling,
-                                              .augmented = augmented,
-                                              .alpha_slow = alpha_slow,
-                                              .alpha_fast = alpha_fast,
-                                              .seed = seed};
-                new (self) Particles(make_filter<ParticleFilter>(device, maps, options));
-              },
-              "device"_a, "maps"_a, "region"_a = PoseLattice{}, nb::kw_only(),
-              "particles"_a = ParticleOptions{}.particles, "contact"_a = ContactModel{},
-              "motion_mm"_a = ParticleOptions{}.motion_mm,
-              "motion_rad"_a = ParticleOptions{}.motion_rad,
-              "resampling"_a = Resampling::multinomial, "augmented"_a = false,
-              "alpha_slow"_a = ParticleOptions{}.alpha_slow,
-              "alpha_fast"_a = ParticleOptions{}.alpha_fast, "seed"_a = 0,
-              "Particles start uniformly over the region, whose bin counts are ignored. motion_mm\n"
-              "and motion_rad: standard deviations of the noise at each touch; augmented: adds\n"
-              "random particles while touches fit worse than before (Augmented MCL).\n\n"
-              "Raises Error as PoseHistogram does.")
-          .def("update", &update<ParticleFilter>, "touches"_a, "progress"_a = nb::none(),
-               "Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).\n\n"
-               "After Ctrl-C, or where progress(fraction) raises, call reset(). Raises Error on a\n"
-               "touch that is not sound, of which none is taken in.")
-          .def("estimate", shared_method<Particles>(&ParticleFilter::estimate),
-               "Identity by Eq. 9; the pose is the maximum of the Parzen estimate (Eq. 10-12).")
-          .def("reset", shared_method<Particles>(&ParticleFilter::reset),
-               "Restores the initial particles for the next unknown.")
-          .def("effective_sample_size",
-               shared_method<Particles>(&ParticleFilter::effective_sample_size),
-               "1 / sum of squared weights, in [1, n].")
-          .def("particles", &particles,
-               "All particles: objects [n], T_object_robot [n, 3] (x_mm, y_mm, theta_rad) and\n"
-               "weights [n], which sum to 1.")
-          .def_prop_ro("device_bytes", shared_method<Particles>(&ParticleFilter::device_bytes),
-                       "Device memory held.");
-  bind_text(filter, "ParticleFilter");
+  const ParticleOptions usual;
+  nb::class_<Particles>(
+      module, "ParticleFilter",
+      "Monte Carlo localization over object identity and planar pose (Sec. III-B, Eq. 8-12).")
+      .def(
+          "__init__",
+          [](Particles* self, const std::shared_ptr<Device>& device, const MapsLike& maps,
+             const PoseLattice& region, int count, const ContactModel& contact, double motion_mm,
+             double motion_rad, Resampling resampling, bool augmented, double alpha_slow,
+             double alpha_fast, std::uint64_t seed) {
+            const ParticleOptions options{.particles = count,
+                                          .region = region,
+                                          .contact = contact,
+                                          .motion_mm = motion_mm,
+                                          .motion_rad = motion_rad,
+                                          .resampling = resampling,
+                                          .augmented = augmented,
+                                          .alpha_slow = alpha_slow,
+                                          .alpha_fast = alpha_fast,
+                                          .seed = seed};
+            new (self)
+                Particles(make_filter<ParticleFilter>("ParticleFilter", device, maps, options));
+          },
+          "device"_a, "maps"_a, "region"_a = PoseLattice{}, nb::kw_only(),
+          "particles"_a = usual.particles, "contact"_a = usual.contact,
+          "motion_mm"_a = usual.motion_mm, "motion_rad"_a = usual.motion_rad,
+          "resampling"_a = usual.resampling, "augmented"_a = usual.augmented,
+          "alpha_slow"_a = usual.alpha_slow, "alpha_fast"_a = usual.alpha_fast, "seed"_a = 0,
+          "Particles start uniformly over the region, whose bin counts are ignored. motion_mm\n"
+          "and motion_rad: standard deviations of the noise at each touch; augmented: adds\n"
+          "random particles while touches fit worse than before (Augmented MCL).\n\n"
+          "Raises Error as PoseHistogram does.")
+      .def("update", &update<ParticleFilter>, "touches"_a, "progress"_a = nb::none(),
+           "Resamples, moves and weighs the particles by each touch in turn (Eq. 7-8).\n\n"
+           "After Ctrl-C, or where progress(fraction) raises, call reset(). Raises Error on a\n"
+           "touch that is not sound, of which none is taken in.")
+      .def("estimate", shared_method<Particles>(&ParticleFilter::estimate),
+           "Identity by Eq. 9; the pose is the maximum of the Parzen estimate (Eq. 10-12).")
+      .def("reset", shared_method<Particles>(&ParticleFilter::reset),
+           "Restores the initial particles for the next unknown.")
+      .def("effective_sample_size",
+           shared_method<Particles>(&ParticleFilter::effective_sample_size),
+           "1 / sum of squared weights, in [1, n].")
+      .def("particles", &particles,
+           "All particles: objects [n], T_object_robot [n, 3] (x_mm, y_mm, theta_rad) and\n"
+           "weights [n], which sum to 1.")
+      .def_prop_ro("device_bytes", shared_method<Particles>(&ParticleFilter::device_bytes),
+                   "Device memory held.")
+      .def("__repr__", [](const Particles& self) { return self.text; });
 }
 
 using Bounded = Named<BoundedPosterior>;
@@ -298,7 +274,8 @@ void bind_bounded(nb::module_& module) {
                                              .none_weight = none_weight,
                                              .threads = threads,
                                              .cancel_point = check_signals};
-                new (self) Bounded(make_filter<BoundedPosterior>(device, maps, options));
+                new (self) Bounded(
+                    make_filter<BoundedPosterior>("BoundedPosterior", device, maps, options));
               },
               "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
               "contact"_a = ContactModel{}, "tolerance"_a = BoundedOptions{}.tolerance,
@@ -334,9 +311,9 @@ void bind_bounded(nb::module_& module) {
           .def(
               "log_likelihood",
               [](const Bounded& self, int object, const ArrayLike& T_object_robot) {
-                const Pose pose = pose_of(T_object_robot, "T_object_robot");
                 return self.use(
-                    [&](BoundedPosterior& belief) { return belief.log_likelihood(object, pose); });
+                    [object, pose = pose_of(T_object_robot, "T_object_robot")](
+                        BoundedPosterior& belief) { return belief.log_likelihood(object, pose); });
               },
               "object"_a, "T_object_robot"_a,
               "Log-likelihood of any pose [3] of an object in nats, in float64.")
@@ -346,7 +323,7 @@ void bind_bounded(nb::module_& module) {
                "share of the belief that all other bins hold together.")
           .def_prop_ro("host_bytes", shared_method<Bounded>(&BoundedPosterior::host_bytes),
                        "Memory held.");
-  bind_belief(belief, "BoundedPosterior");
+  bind_belief(belief);
 }
 
 }  // namespace

@@ -61,22 +61,12 @@ std::vector<std::string> remarks_on(const ImportedRecording& imported,
 
 using Imported = std::tuple<RecordingObject, std::vector<std::string>>;
 
-/// The options, with the elements that stand for the array.
-ImportOptions with_elements(ImportOptions options, const std::optional<ArrayLike>& elements_mm) {
-  if (elements_mm) {
-    options.elements_mm = points_of(*elements_mm, "array");
-  }
-  return options;
-}
-
 Imported returned(ImportedRecording imported, const ImportOptions& options) {
   std::vector<std::string> remarks = remarks_on(imported, options);
   return {to_python(std::move(imported.recording)), std::move(remarks)};
 }
 
-Imported import_tables_python(const ImportOptions& given,
-                              const std::optional<ArrayLike>& elements_mm) {
-  const ImportOptions options = with_elements(given, elements_mm);
+Imported import_tables_python(const ImportOptions& options) {
   return returned(run([&] { return import_tables(options); }), options);
 }
 
@@ -99,12 +89,10 @@ std::optional<std::array<double, 7>> row_of_matrix(const std::vector<double>& nu
   return {};
 }
 
-Imported import_frames(const ImportOptions& given, const ArrayLike& pressures,
+Imported import_frames(const ImportOptions& options, const ArrayLike& pressures,
                        const std::optional<ArrayLike>& time_s, const ArrayLike& pose_time_s,
-                       const std::optional<ArrayLike>& elements_mm,
                        const std::optional<ArrayLike>& poses,
                        const std::optional<ArrayLike>& object_pose) {
-  const ImportOptions options = with_elements(given, elements_mm);
   ArrayReader reader;
   ImportRows rows;
   const Floats readings = reader.floats(pressures, "pressures", {"n", "e"});
@@ -138,6 +126,13 @@ void bind_import(nb::module_& module) {
       .def_rw("pressures", &ImportOptions::pressures)
       .def_rw("poses", &ImportOptions::poses)
       .def_rw("array", &ImportOptions::array)
+      .def_prop_rw(
+          "elements_mm",
+          [](const ImportOptions& self) { return to_array(self.elements_mm.value()); },
+          [](ImportOptions& self, const ArrayLike& elements_mm) {
+            self.elements_mm = points_of(elements_mm, "array");
+          },
+          "[e, 2], in the place of the array.")
       .def_rw("first_element", &ImportOptions::first_element)
       .def_rw("order", &ImportOptions::order)
       .def_rw("dead", &ImportOptions::dead)
@@ -161,24 +156,18 @@ void bind_import(nb::module_& module) {
       .def_rw("rows", &ImportOptions::rows)
       .def_rw("object", &ImportOptions::object)
       .def_rw("unposed", &ImportOptions::unposed);
-  module.def(
-      "import_tables", &import_tables_python, "options"_a, "elements_mm"_a = nb::none(),
-      "The recording, and what is worth a warning. elements_mm [e, 2] stands for the array.");
+  module.def("import_tables", &import_tables_python, "options"_a,
+             "The recording, and what is worth a warning.");
   module.def(
       "row_of_matrix", &row_of_matrix, "numbers"_a,
       "The 12 or 16 numbers of a homogeneous matrix, m, by columns or by rows, whichever is a\n"
       "rotation, as a position, mm, and a quaternion x, y, z, w; None where neither is.");
-  module.def(
-      "require_sound",
-      [](const ImportOptions& options, const std::optional<ArrayLike>& elements_mm) {
-        require_sound(with_elements(options, elements_mm));
-      },
-      "options"_a, "elements_mm"_a = nb::none(),
-      "Raises Error where import_frames() would refuse the options or the array.");
+  module.def("require_sound", nb::overload_cast<const ImportOptions&>(&palpate::require_sound),
+             "options"_a,
+             "Raises Error where import_frames() would refuse the options or the array.");
   module.def(
       "import_frames", &import_frames, "options"_a, "pressures"_a, "time_s"_a.none(),
-      "pose_time_s"_a, "elements_mm"_a = nb::none(), "poses"_a = nb::none(),
-      "object_pose"_a = nb::none(),
+      "pose_time_s"_a, "poses"_a = nb::none(), "object_pose"_a = nb::none(),
       "As import_tables() of frames [n, e] at times [n], or of touches, and of poses of the\n"
       "sensor [m, 7] in the robot frame, mm and a quaternion x, y, z, w, at times [m], or one for\n"
       "each frame where there are no times; and of an object's pose [7].");

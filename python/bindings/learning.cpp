@@ -11,9 +11,8 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
-#include "json.hpp"
-#include "learning/calibration_task.hpp"
 #include "learning/map_task.hpp"
+#include "learning/sensor_calibration.hpp"
 #include "learning/setup_check.hpp"
 #include "model/element_spacing.hpp"
 #include "model/option_words.hpp"
@@ -88,8 +87,7 @@ void bind_learned_sensor(nb::module_& module) {
       .def(
           "save",
           [](const LearnedSensor& self, const PathLike& file) {
-            const std::filesystem::path path = file.path();
-            run([&] { write_sensor_model(path, self); });
+            run([&, path = file.path()] { write_sensor_model(path, self); });
           },
           "path"_a,
           "Writes the sensor model (YAML), which recognize() and the commands take. Raises Error\n"
@@ -103,13 +101,10 @@ void bind_learned_sensor(nb::module_& module) {
       });
 }
 
-SensorCalibration calibrate(const std::vector<Recording>& recordings, PythonRequest request,
-                            const CalibrationRequest& wanted, const Report& report) {
-  if (request.given_maps.empty()) {
-    read_maps(request);
-  }
-  const CalibrationTask task = calibration_task(wanted, request, recordings, request.given_maps);
-  return calibrate_sensor(task.presses, task.maps, task.options, report);
+Json to_json(const ComparedScores& scores) {
+  return {{"before", to_json(scores.before)},
+          {"table", to_json(scores.table)},
+          {"after", to_json(scores.after)}};
 }
 
 Json to_json(const SensorCalibration& calibration) {
@@ -119,16 +114,12 @@ Json to_json(const SensorCalibration& calibration) {
                              {"levels", table.kind.levels},
                              {"log_loss", table.log_loss}});
   }
-  if (calibration.before) {
-    json["before"] = to_json(*calibration.before);
-    json["table"] = to_json(*calibration.table);
-    json["after"] = to_json(*calibration.after);
+  if (calibration.touches) {
+    json.update(to_json(*calibration.touches));
   }
-  if (const auto& groups = calibration.groups) {
-    json["groups"] = {{"touches", groups->touches},
-                      {"before", to_json(groups->before)},
-                      {"table", to_json(groups->table)},
-                      {"after", to_json(groups->after)}};
+  if (calibration.groups) {
+    json["groups"] = {{"touches", presses_in_group}};
+    json["groups"].update(to_json(*calibration.groups));
   }
   if (calibration.array_offset) {
     json["array_offset"] = to_json(*calibration.array_offset, in_keywords);
@@ -137,25 +128,33 @@ Json to_json(const SensorCalibration& calibration) {
   return json;
 }
 
-std::tuple<Fields, LearnedSensor> calibrate_python(nb::handle given, const PythonRequest& request,
-                                                   const CalibrationRequest& wanted,
-                                                   const Progress& progress) {
+std::tuple<Fields, LearnedSensor> calibrate(nb::handle given, PythonRequest request,
+                                            const CalibrationRequest& wanted,
+                                            const Progress& progress) {
   const std::vector<Recording> recordings = recordings_of(given);
   const SensorCalibration calibration = run(progress, [&](const Report& report) {
-    return calibrate(recordings, request, wanted, report);
+    if (request.given_maps.empty()) {
+      read_maps(request);
+    }
+    const CalibrationTask task = calibration_task(wanted, request, recordings, request.given_maps);
+    return calibrate_sensor(task.presses, task.maps, task.options, report);
   });
   return {fields_of(to_json(calibration)), calibration.sensor};
 }
 
-Json check(const std::vector<Recording>& recordings, const PythonRequest& request, double cell_mm,
-           std::optional<double> spread_mm, const Report& report) {
-  const Recording& first = recordings.front();
-  MapOptions options{.cell_mm = cell_mm,
-                     .sensor = {.spread_mm = spread_mm ? *spread_mm : usual_spread_mm(recordings)}};
-  options.classifier =
-      make_classifier(first.pressure_unit, first.path, request.threshold, request.ratio);
-  const auto device = device_of(request.open_device, request.device);
-  const SetupCheck check = check_setup(*device, recordings, options, report);
+Fields check(nb::handle given, const PythonRequest& request, double cell_mm,
+             std::optional<double> spread_mm, const Progress& progress) {
+  const std::vector<Recording> recordings = recordings_of(given);
+  const SetupCheck check = run(progress, [&](const Report& report) {
+    const Recording& first = recordings.front();
+    const MapOptions options{
+        .cell_mm = cell_mm,
+        .sensor = {.spread_mm = spread_mm ? *spread_mm : usual_spread_mm(recordings)},
+        .classifier =
+            make_classifier(first.pressure_unit, first.path, request.threshold, request.ratio)};
+    const auto device = device_of(request.open_device, request.device);
+    return check_setup(*device, recordings, options, report);
+  });
   Json json{{"findings", Json::array()},
             {"remarks", in_python(check.remarks)},
             {"elements_mm", Json::array()},
@@ -166,36 +165,37 @@ Json check(const std::vector<Recording>& recordings, const PythonRequest& reques
   for (const glm::dvec2& p : check.elements_mm) {
     json["elements_mm"].push_back({p.x, p.y});
   }
-  return json;
+  return fields_of(json);
 }
 
-Fields check_python(nb::handle given, const PythonRequest& request, double cell_mm,
-                    std::optional<double> spread_mm, const Progress& progress) {
+using Learned =
+    std::tuple<std::vector<OccupancyGrid>, std::optional<LearnedSensor>, Sentences, Sentences>;
+
+Learned learn(nb::handle given, const PythonRequest& shared, MapRequest request,
+              const Progress& progress) {
+  request.shared = shared;
   const std::vector<Recording> recordings = recordings_of(given);
-  return fields_of(run(progress, [&](const Report& report) {
-    return check(recordings, request, cell_mm, spread_mm, report);
-  }));
-}
-
-LearnedMaps learn(const std::vector<Recording>& recordings, const MapRequest& request,
-                  const std::shared_ptr<Device>& open_device, const Report& report) {
-  const MapTask task = map_task(request, recordings);
-  std::shared_ptr<Device> device;
-  LearnedMaps learned = learn_maps(
-      task,
-      [&]() -> Device& {
-        device = device_of(open_device, request.shared.device);
-        return *device;
-      },
-      report);
-  learned.remarks.insert(learned.remarks.begin(), task.remarks.begin(), task.remarks.end());
-  if (!request.output.empty()) {
-    save(request, learned);
+  LearnedMaps learned = run(progress, [&](const Report& report) {
+    const MapTask task = map_task(request, recordings);
+    std::shared_ptr<Device> device;
+    const auto open = [&]() -> Device& {
+      device = device_of(shared.open_device, request.shared.device);
+      return *device;
+    };
+    LearnedMaps made = learn_maps(task, open, report);
+    made.remarks.insert(made.remarks.begin(), task.remarks.begin(), task.remarks.end());
+    if (!request.output.empty()) {
+      save(request, made);
+    }
+    return made;
+  });
+  std::vector<OccupancyGrid> maps;
+  for (auto& [name, map] : learned.maps) {
+    maps.push_back(std::move(map));
   }
-  return learned;
+  return {std::move(maps), std::move(learned.sensor), in_python(std::move(learned.words)),
+          in_python(std::move(learned.remarks))};
 }
-
-using Learned = std::tuple<std::vector<OccupancyGrid>, std::optional<LearnedSensor>, Sentences>;
 
 void bind_maps_learned(nb::module_& module) {
   nb::class_<MapRequest>(module, "MapRequest", "What is asked of maps beside a Request's options.")
@@ -212,23 +212,8 @@ void bind_maps_learned(nb::module_& module) {
       .def_rw("group", &MapRequest::group)
       .def_rw("unposed", &MapRequest::unposed)
       .def_rw("max_maps", &MapRequest::max_maps);
-  module.def(
-      "learn_maps",
-      [](nb::handle given, const PythonRequest& shared, MapRequest request,
-         const Progress& progress) {
-        request.shared = shared;
-        const std::vector<Recording> recordings = recordings_of(given);
-        LearnedMaps learned = run(progress, [&](const Report& report) {
-          return learn(recordings, request, shared.open_device, report);
-        });
-        Learned result{{}, std::move(learned.sensor), in_python(std::move(learned.words))};
-        for (auto& [name, map] : learned.maps) {
-          std::get<0>(result).push_back(std::move(map));
-        }
-        return std::tuple_cat(std::move(result), std::tuple(in_python(std::move(learned.remarks))));
-      },
-      "recordings"_a, "request"_a, "maps"_a, "progress"_a = nb::none(),
-      "The maps, the sensor, what is said of them, and what is worth a warning.");
+  module.def("learn_maps", &learn, "recordings"_a, "request"_a, "maps"_a, "progress"_a = nb::none(),
+             "The maps, the sensor, what is said of them, and what is worth a warning.");
 }
 
 }  // namespace
@@ -244,12 +229,12 @@ void bind_learning(nb::module_& module) {
       .def_rw("levels", &CalibrationRequest::levels)
       .def_rw("max_maps", &CalibrationRequest::max_maps)
       .def_rw("group", &CalibrationRequest::group);
-  module.def("calibrate", &calibrate_python, "recordings"_a, "request"_a, "calibration"_a,
+  module.def("calibrate", &calibrate, "recordings"_a, "request"_a, "calibration"_a,
              "progress"_a = nb::none(),
              "What was learned, and the sensor; of the request count the maps, classifier, bins,\n"
              "frames and device.");
-  module.def("check_setup", &check_python, "recordings"_a, "request"_a, "cell_mm"_a,
-             "spread_mm"_a.none(), "progress"_a = nb::none(),
+  module.def("check_setup", &check, "recordings"_a, "request"_a, "cell_mm"_a, "spread_mm"_a.none(),
+             "progress"_a = nb::none(),
              "What the touches say; of the request count the classifier and the device.");
   bind_maps_learned(module);
 }

@@ -5,16 +5,13 @@
 #include <nanobind/stl/shared_ptr.h>
 
 #include "bindings.hpp"
-#include "estimate.hpp"
 #include "palpate/balanced_lattice.hpp"
 #include "palpate/drawn_map.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
-#include "palpate/object_frame.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose_error.hpp"
-#include "palpate/rotational_symmetry.hpp"
 #include "shared.hpp"
 #include "touches.hpp"
 
@@ -41,14 +38,11 @@ nb::object cells_or_none(const OccupancyGrid& map, const std::vector<float>& cel
 std::vector<std::vector<glm::dvec2>> polygons_of(const ArrayLike& object) {
   const bool several = nb::isinstance<nb::sequence>(object) && nb::len(object) > 0 &&
                        nb::cast<int>(call("numpy", "ndim", object[0])) == 2;
+  const nb::object all = several ? nb::borrow(object) : nb::make_tuple(object);
   std::vector<std::vector<glm::dvec2>> polygons;
-  if (!several) {
-    polygons.push_back(points_of(object, "polygon"));
-  }
-  for (std::size_t i = 0; several && i < nb::len(object); ++i) {
-    polygons.push_back(points_of(object[i], fmt::format("polygon[{}]", i).c_str()));
-  }
-  for (std::size_t i = 0; i < polygons.size(); ++i) {
+  for (std::size_t i = 0; i < nb::len(all); ++i) {
+    const std::string name = several ? fmt::format("polygon[{}]", i) : "polygon";
+    polygons.push_back(points_of(all[i], name.c_str()));
     if (polygons[i].size() < 3) {
       throw Error(Fault::input,
                   fmt::format("polygon {} of {} vertices: give at least 3", i, polygons[i].size()));
@@ -127,8 +121,8 @@ void bind_map(nb::module_& module) {
              const std::optional<ArrayLike>& observations,
              const std::optional<ArrayLike>& mean_level) {
             ArrayReader reader;
-            const auto cells = [&](const ArrayLike& given, const char* name) {
-              return reader.floats(given, name, {"ny", "nx"});
+            const auto cells = [&](const std::optional<ArrayLike>& given, const char* name) {
+              return given ? reader.floats(*given, name, {"ny", "nx"}) : Floats();
             };
             OccupancyGrid map{.label = label,
                               .cell_mm = cell_mm,
@@ -141,12 +135,8 @@ void bind_map(nb::module_& module) {
             map.log_odds = cells_of(odds);
             map.ny = static_cast<int>(odds.shape[0]);
             map.nx = static_cast<int>(odds.shape[1]);
-            if (observations) {
-              map.observations = cells_of(cells(*observations, "observations"));
-            }
-            if (mean_level) {
-              map.mean_level = cells_of(cells(*mean_level, "mean_level"));
-            }
+            map.observations = cells_of(cells(observations, "observations"));
+            map.mean_level = cells_of(cells(mean_level, "mean_level"));
             if (const auto fault = fault_of(map)) {
               throw Error(Fault::input, *fault);
             }
@@ -198,9 +188,8 @@ void bind_map(nb::module_& module) {
       .def(
           "save",
           [](const OccupancyGrid& self, const PathLike& file) {
-            const OccupancyGrid copy = self;  // which another thread may change meanwhile
-            const std::filesystem::path path = file.path();
-            run([&] { write_map(path, copy); });
+            // Another thread may change the map meanwhile.
+            run([path = file.path(), copy = self] { write_map(path, copy); });
           },
           "path"_a, "Writes a map file (HDF5). Raises Error where it cannot be written.")
       .def("plot", plot_method, "ax"_a = nb::none(), plot_signature,
@@ -213,10 +202,7 @@ void bind_map(nb::module_& module) {
   bind_drawn_maps(grid);
   module.def(
       "read_map",
-      [](const PathLike& file) {
-        const std::filesystem::path path = file.path();
-        return run([&] { return read_map(path); });
-      },
+      [](const PathLike& file) { return run([path = file.path()] { return read_map(path); }); },
       "path"_a,
       "Reads a map file (HDF5). Raises Error naming file, field and remedy; see read_recording()\n"
       "for damaged files.");
@@ -301,11 +287,6 @@ void add_touches(const Builder& builder, const TouchesLike& touches, const Progr
   });
 }
 
-MapOptions options_of(double cell_mm, const InverseSensorModel& sensor,
-                      const ContactClassifier& classifier) {
-  return {.cell_mm = cell_mm, .sensor = sensor, .classifier = classifier};
-}
-
 }  // namespace
 
 void bind_maps(nb::module_& module) {
@@ -324,7 +305,8 @@ void bind_map_builder(nb::module_& module) {
           "__init__",
           [](Builder* self, const std::shared_ptr<Device>& device, double cell_mm,
              const InverseSensorModel& sensor, const ContactClassifier& classifier) {
-            const MapOptions options = options_of(cell_mm, sensor, classifier);
+            const MapOptions options{
+                .cell_mm = cell_mm, .sensor = sensor, .classifier = classifier};
             new (self) Builder(
                 make_shared_on(device, [&](Device& on) { return MapBuilder(on, options); }));
           },
@@ -354,7 +336,7 @@ void bind_map_builder(nb::module_& module) {
           all.push_back({label, std::move(views.touches)});
           kept.push_back(std::move(views.kept));
         }
-        const MapOptions options = options_of(cell_mm, sensor, classifier);
+        const MapOptions options{.cell_mm = cell_mm, .sensor = sensor, .classifier = classifier};
         return run([&] { return estimate_prior(device, all, options); });
       },
       "device"_a, "objects"_a, nb::kw_only(), "cell_mm"_a = MapOptions{}.cell_mm,

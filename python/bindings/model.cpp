@@ -1,3 +1,5 @@
+#include <tuple>
+
 #include <fmt/format.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
@@ -6,9 +8,8 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/displacement.hpp"
+#include "palpate/map_builder.hpp"
 #include "palpate/pose.hpp"
-#include "palpate/sensor_model.hpp"
 
 namespace palpate::python {
 
@@ -31,17 +32,18 @@ std::string axis_text(const Axis& axis) {
   return fmt::format("({:g}, {:g}, {})", axis.lower, axis.upper, axis.count);
 }
 
+/// A constructor.
+template <typename Class, typename... Numbers>
+void from_tuple(Class* self, const std::tuple<Numbers...>& numbers) {
+  std::apply([self](Numbers... number) { new (self) Class{number...}; }, numbers);
+}
+
 void bind_lattice(nb::module_& module) {
   nb::class_<Axis>(module, "Axis",
                    "`count` bins of equal width over [lower, upper], in mm or radians. A tuple\n"
                    "(lower, upper, count) stands for an axis.")
       .def(nb::init<double, double, int>(), "lower"_a, "upper"_a, "count"_a = 1)
-      .def(
-          "__init__",
-          [](Axis* self, const std::tuple<double, double, int>& axis) {
-            new (self) Axis{std::get<0>(axis), std::get<1>(axis), std::get<2>(axis)};
-          },
-          "axis"_a)
+      .def("__init__", &from_tuple<Axis, double, double, int>, "axis"_a)
       .def_rw("lower", &Axis::lower, "Lower edge of the first bin.")
       .def_rw("upper", &Axis::upper, "Upper edge of the last bin.")
       .def_rw("count", &Axis::count, "Number of bins.")
@@ -149,12 +151,7 @@ void bind_contact(nb::module_& module) {
                              "Standard deviations of a small displacement: of x and y in mm, and "
                              "of the angle in radians.\nA tuple (mm, rad) stands for one.")
       .def(nb::init<double, double>(), "mm"_a = 0.0, "rad"_a = 0.0)
-      .def(
-          "__init__",
-          [](DisplacementSd* self, const std::tuple<double, double>& sd) {
-            new (self) DisplacementSd{std::get<0>(sd), std::get<1>(sd)};
-          },
-          "sd"_a)
+      .def("__init__", &from_tuple<DisplacementSd, double, double>, "sd"_a)
       .def_rw("mm", &DisplacementSd::mm, "Of x and y, in mm.")
       .def_rw("rad", &DisplacementSd::rad, "Of the angle, in radians.")
       .def("__repr__", &repr_of);

@@ -9,9 +9,8 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
-#include "estimate.hpp"
-#include "json.hpp"
 #include "model/option_words.hpp"
 #include "recognition/judged_results.hpp"
 #include "recognition/record_json.hpp"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <type_traits>
 
 #include <fmt/format.h>
@@ -12,10 +13,8 @@
 #include <nanobind/stl/variant.h>
 
 #include "bindings.hpp"
-#include "estimate.hpp"
 #include "model/option_words.hpp"
 #include "options/option.hpp"
-#include "options/refused_option.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recognition/recordings.hpp"
@@ -35,25 +34,15 @@ Value typed(nb::handle value) {
 
 /// What Python gives for the value of an option.
 template <typename Value>
-struct Given {
-  using Type = std::conditional_t<std::is_enum_v<Value>, std::string, Value>;
-};
+struct Given : std::type_identity<std::conditional_t<std::is_enum_v<Value>, std::string, Value>> {};
 template <>
-struct Given<Bins> {
-  using Type = std::variant<std::array<int, 3>, std::string>;
-};
+struct Given<Bins> : std::type_identity<std::variant<std::array<int, 3>, std::string>> {};
 template <>
-struct Given<Pivot> {
-  using Type = std::variant<std::array<double, 2>, std::string>;
-};
+struct Given<Pivot> : std::type_identity<std::variant<std::array<double, 2>, std::string>> {};
 template <>
-struct Given<NoneWeight> {
-  using Type = std::variant<double, std::string>;
-};
+struct Given<NoneWeight> : std::type_identity<std::variant<double, std::string>> {};
 template <>
-struct Given<Frames> {
-  using Type = std::array<std::int64_t, 2>;
-};
+struct Given<Frames> : std::type_identity<std::array<std::int64_t, 2>> {};
 
 /// The text of an option's value, as a flag has it.
 struct OptionText {
@@ -62,11 +51,11 @@ struct OptionText {
 
   template <typename Value>
   std::string operator()(Value Request::* /*of*/) const {
-    return text(typed<typename Given<Value>::Type>(given));
+    return text(typed<typename Given<Value>::type>(given));
   }
   template <typename Value>
   std::string operator()(std::optional<Value> Request::* /*of*/) const {
-    return text(typed<typename Given<Value>::Type>(given));
+    return text(typed<typename Given<Value>::type>(given));
   }
 
  private:
@@ -117,6 +106,41 @@ nb::object items_of(nb::handle given) {
 }
 
 }  // namespace
+
+nb::object to_python(const nlohmann::ordered_json& json) {
+  switch (json.type()) {
+    case nlohmann::ordered_json::value_t::object: {
+      nb::dict result;
+      for (const auto& [key, value] : json.items()) {
+        result[key.c_str()] = to_python(value);
+      }
+      return result;
+    }
+    case nlohmann::ordered_json::value_t::array: {
+      nb::list result;
+      for (const nlohmann::ordered_json& value : json) {
+        result.append(to_python(value));
+      }
+      return result;
+    }
+    case nlohmann::ordered_json::value_t::string: {
+      const auto& text = json.get_ref<const std::string&>();
+      // The path of a recording need not be UTF-8.
+      return nb::steal(
+          PyUnicode_DecodeFSDefaultAndSize(text.data(), static_cast<Py_ssize_t>(text.size())));
+    }
+    case nlohmann::ordered_json::value_t::boolean:
+      return nb::bool_(json.get<bool>());
+    case nlohmann::ordered_json::value_t::number_integer:
+      return nb::int_(json.get<std::int64_t>());
+    case nlohmann::ordered_json::value_t::number_unsigned:
+      return nb::int_(json.get<std::uint64_t>());
+    case nlohmann::ordered_json::value_t::number_float:
+      return nb::float_(json.get<double>());
+    default:
+      return nb::none();
+  }
+}
 
 void add_maps(nb::handle given, Request& request) {
   for (const nb::handle item : items_of(given)) {

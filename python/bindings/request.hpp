@@ -5,12 +5,23 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "call.hpp"
 #include "palpate/device.hpp"
 #include "recognition/recognition_job.hpp"
 #include "recognition/request.hpp"
 
 namespace palpate::python {
+
+/// What a result holds, as in the JSON of a command; palpate.results makes attributes of the keys.
+using Fields = nb::typed<nb::dict, nb::str, nb::any>;
+
+nb::object to_python(const nlohmann::ordered_json& json);
+/// @param json an object
+inline Fields fields_of(const nlohmann::ordered_json& json) {
+  return nb::borrow<Fields>(to_python(json));
+}
 
 using Sentences = std::vector<std::string>;  ///< what is worth a warning
 

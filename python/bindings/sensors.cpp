@@ -8,7 +8,6 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
-#include "palpate/baseline.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/sensor.hpp"
@@ -46,20 +45,15 @@ std::optional<Frame> next(const SharedSensor& self, std::optional<double> timeou
     throw nb::value_error("timeout_s: is not a number; give seconds, or None to wait for a frame");
   }
   const auto end = Clock::now() + std::chrono::duration<double>(
-                                      std::clamp(timeout_s.value_or(0.0), 0.0, longest_s));
-  const auto take = called([&](Sensor& sensor) {
-    auto wait = std::chrono::milliseconds(50);
-    if (timeout_s) {
-      const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
-      wait = std::clamp(left, 0ms, wait);
-    }
-    auto taken = sensor.next(wait);
-    const bool over = !taken && sensor.ended();
-    return std::pair(std::move(taken), over);
-  });
+                                      std::clamp(timeout_s.value_or(longest_s), 0.0, longest_s));
   for (;;) {
-    auto [frame, ended] = take(self);
-    if (frame || ended || (timeout_s && Clock::now() >= end)) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
+    auto [frame, over] = called([wait = std::clamp(left, 0ms, 50ms)](Sensor& sensor) {
+      auto taken = sensor.next(wait);
+      const bool is_last = !taken && sensor.ended();
+      return std::pair(std::move(taken), is_last);
+    })(self);
+    if (frame || over || left <= 0ms) {
       return std::move(frame);
     }
     if (PyErr_CheckSignals() != 0) {
@@ -70,15 +64,12 @@ std::optional<Frame> next(const SharedSensor& self, std::optional<double> timeou
 
 SharedSensor open_sensor(const PathLike& board_or_file,
                          const std::optional<PathLike>& pose_source) {
-  std::optional<std::filesystem::path> poses;
-  if (pose_source) {
-    poses = pose_source->path();
-  }
+  const auto poses = pose_source ? std::optional(pose_source->text()) : std::nullopt;
   const std::string name = board_or_file.text();
   return {"sensor", {}, run([&] {
             std::unique_ptr<Sensor> opened =
                 is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
-            return poses ? std::make_unique<PosedSensor>(std::move(opened), poses->string())
+            return poses ? std::make_unique<PosedSensor>(std::move(opened), *poses)
                          : std::move(opened);
           })};
 }
@@ -213,6 +204,7 @@ void bind_detector(nb::module_& module) {
                    "[3] (x_mm, y_mm, theta_rad), or None.")
       .def("__repr__", &repr_of);
 
+  const TouchDetectorOptions usual;
   nb::class_<TouchDetector>(module, "TouchDetector",
                             "Finds touches in a stream of frames by onset, steady phase and "
                             "release.\nPressures are in the sensor's unit, above the baseline.")
@@ -222,28 +214,19 @@ void bind_detector(nb::module_& module) {
              double smooth_s, double drift_s, const std::optional<ArrayLike>& baseline,
              const std::optional<ArrayLike>& valid) {
             ArrayReader reader;
-            std::vector<double> zeros;
-            std::vector<std::uint8_t> alive;
-            if (baseline) {
-              zeros = reader.floats(*baseline, "baseline", {"e"}).copied();
-            }
-            if (valid) {
-              alive = reader.flags(*valid, "valid", {"e"}).copied();
-            }
+            const Floats zeros = baseline ? reader.floats(*baseline, "baseline", {"e"}) : Floats();
+            const Bytes alive = valid ? reader.flags(*valid, "valid", {"e"}) : Bytes();
             new (self) TouchDetector({.onset = onset,
                                       .release = release,
                                       .steady = steady,
                                       .min_steady_s = min_steady_s,
                                       .smooth_s = smooth_s,
                                       .drift_s = drift_s},
-                                     std::move(zeros), std::move(alive));
+                                     zeros.copied(), alive.copied());
           },
-          nb::kw_only(), "onset"_a = TouchDetectorOptions{}.onset,
-          "release"_a = TouchDetectorOptions{}.release,
-          "min_steady_s"_a = TouchDetectorOptions{}.min_steady_s,
-          "steady"_a = TouchDetectorOptions{}.steady,
-          "smooth_s"_a = TouchDetectorOptions{}.smooth_s,
-          "drift_s"_a = TouchDetectorOptions{}.drift_s, "baseline"_a = nb::none(),
+          nb::kw_only(), "onset"_a = usual.onset, "release"_a = usual.release,
+          "min_steady_s"_a = usual.min_steady_s, "steady"_a = usual.steady,
+          "smooth_s"_a = usual.smooth_s, "drift_s"_a = usual.drift_s, "baseline"_a = nb::none(),
           "valid"_a = nb::none(),
           "A touch begins where the largest pressure exceeds onset and ends where it falls below\n"
           "release. baseline [e]: what the untouched array reads; valid [e], False for a dead\n"

@@ -39,11 +39,7 @@ class Shared {
   /// Runs `work(object)`.
   template <typename F>
   auto use(F work) const {
-    Held& held = held_here(held_, name_);
-    return run([&] {
-      const ExclusiveUse use(held);
-      return work(held.object);
-    });
+    return use(Progress(), [&](Object& object, const Report&) { return work(object); });
   }
 
   /// For what never changes, which may be read while another thread works.

@@ -53,13 +53,13 @@ Result<double, 1> drawn(Random& random, std::size_t n) {
 }  // namespace
 
 void bind_simulation(nb::module_& module) {
+  const SensorModel usual;
   nb::class_<SensorModel>(module, "SensorModel",
                           "The simulated sensor, that of the paper's reference [19].")
       .def(nb::init<double, double, double, double, double, double>(), nb::kw_only(),
-           "psf_mm"_a = SensorModel{}.psf_mm, "element_mm"_a = SensorModel{}.element_mm,
-           "pressure_kpa"_a = SensorModel{}.pressure_kpa,
-           "force_spread"_a = SensorModel{}.force_spread,
-           "gain_spread"_a = SensorModel{}.gain_spread, "noise_kpa"_a = SensorModel{}.noise_kpa,
+           "psf_mm"_a = usual.psf_mm, "element_mm"_a = usual.element_mm,
+           "pressure_kpa"_a = usual.pressure_kpa, "force_spread"_a = usual.force_spread,
+           "gain_spread"_a = usual.gain_spread, "noise_kpa"_a = usual.noise_kpa,
            "psf_mm: standard deviation of the point spread; element_mm: edge of an element;\n"
            "pressure_kpa: mean reading of an element wholly on the shape; force_spread and\n"
            "gain_spread: relative standard deviations of press force and element gain; noise_kpa:\n"

@@ -1,6 +1,5 @@
 #include "touches.hpp"
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -205,16 +204,13 @@ void bind_touches(nb::module_& module) {
   module.def(
       "write_recording",
       [](const PathLike& file, const RecordingObject& recording) {
-        const Recording copy = recording_of(recording);
-        const std::filesystem::path path = file.path();
-        run([&] { write_recording(path, copy); });
+        run([path = file.path(), copy = recording_of(recording)] { write_recording(path, copy); });
       },
       "path"_a, "recording"_a, "Writes a recording file (HDF5), whole or not at all.");
   module.def(
       "read_recording",
       [](const PathLike& file) {
-        const std::filesystem::path path = file.path();
-        return to_python(run([&] { return read_recording(path); }));
+        return to_python(run([path = file.path()] { return read_recording(path); }));
       },
       "path"_a,
       "Reads a recording file (HDF5); of an unclosed file, the whole rows. Raises Error naming\n"

@@ -80,9 +80,6 @@ struct FloatArray : nb::object {
 struct ByteArray : nb::object {
   NB_OBJECT_DEFAULT(ByteArray, nb::object, "numpy.typing.NDArray[numpy.uint8]", any_object)
 };
-struct CountArray : nb::object {
-  NB_OBJECT_DEFAULT(CountArray, nb::object, "numpy.typing.NDArray[numpy.uint64]", any_object)
-};
 /// The path of a file.
 struct PathLike : nb::object {
   NB_OBJECT_DEFAULT(PathLike, nb::object, "str | bytes | os.PathLike[str] | os.PathLike[bytes]",

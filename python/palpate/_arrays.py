@@ -67,15 +67,13 @@ class Reader:
 
     def _checked(self, array: NDArray[Any], name: str, shapes: tuple[Shape, ...]) -> NDArray[Any]:
         shape = shapes[-1] if array.ndim > len(shapes[0]) else shapes[0]
-        fits, extents = array.ndim == len(shape), dict(self._extents)
-        known = []
-        for axis, extent in enumerate(shape):
-            if extent in self._extents:
-                known.append("{} = {} of {}".format(extent, *self._extents[extent]))
-            if fits:
-                is_number = extent.isdigit()
-                here = array.shape[axis]
-                fits = here == (int(extent) if is_number else extents.setdefault(extent, (here, name))[0])
+        known = ["{} = {} of {}".format(extent, *self._extents[extent]) for extent in shape
+                 if extent in self._extents]  # fmt: skip
+        extents = dict(self._extents)
+        fits = array.ndim == len(shape) and all(
+            size == (int(extent) if extent.isdigit() else extents.setdefault(extent, (size, name))[0])
+            for extent, size in zip(shape, array.shape, strict=True)
+        )
         if not fits:
             wanted = f"({', '.join(shape)}{',' if len(shape) == 1 else ''})"
             given_by = f" with {' and '.join(known)}" if known else ""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from . import _palpate
 from ._error import Error
 from ._recording import Recording
-from .recognition import _Path, import_request, warn
+from .recognition import _Path, import_request, warn, without
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
@@ -44,7 +44,8 @@ def read_bag(
     any message with a list of numbers, which pressure_field names where it is not the only one:
     "sensors.taxels.z", a list in each item of a list, or "matrices[1].data", of one item by its index, name
     or frame; several topics, of pads on one hand, are one array, whose elements follow in their order, and a
-    frame of the first takes the nearest of the others; flags beside them that are called valid, validity, is_valid or mask make readings unknown;
+    frame of the first takes the nearest of the others; flags beside them that are called valid, validity,
+    is_valid or mask make readings unknown;
     pose_topic: of poses or transforms in metres, or of messages whose pose_field is one, or is a list of a
     position and a quaternion, or of a matrix; or
     tf: (target, source) frames of /tf and /tf_static, T_target_source, the robot's base and the array;
@@ -58,26 +59,8 @@ def read_bag(
     Raises Error naming log and topic. What import_tables() warns of, and messages without a header,
     become a UserWarning.
     """
-    recording, remarks = read_frames(**locals())
-    warn(remarks)
-    return recording
-
-
-def read_frames(
-    log: _Path,
-    *,
-    pressure_topic: str | Sequence[str],
-    array: Any,
-    pressure_field: str | None,
-    pose_topic: str | None,
-    pose_field: str | None,
-    tf: tuple[str, str] | None,
-    truth_tf: tuple[str, str] | None,
-    pose_delay: float,
-    progress: Callable[[float], object] | None,
-    **options: Any,
-) -> tuple[Recording, list[str]]:
-    """What read_bag() reads, and what is worth a warning."""
+    options = without(locals(), "log", "pressure_topic", "pressure_field", "pose_topic", "pose_field", "tf",
+                      "truth_tf", "progress")  # fmt: skip
     from ._bag_fields import together
     from ._bag_messages import opened
 
@@ -88,44 +71,27 @@ def read_frames(
     name = os.fsdecode(log)
     names = [pressure_topic] if isinstance(pressure_topic, str) else list(pressure_topic)
     source = pose_topic or (":".join(tf) if tf else "")
-    options |= {
-        "array": array,
-        "pressures": f"{name}: {', '.join(names)}",
-        "poses": f"{name}: {source}" if source else "",
-        "pose_delay": pose_delay,
-    }
-    request, elements_mm = import_request(read_bag, options)
-    _palpate.require_sound(request, elements_mm)
+    options["pressures"] = f"{name}: {', '.join(names)}"
+    options["poses"] = f"{name}: {source}" if source else ""
+    request = import_request(read_bag, options)
+    _palpate.require_sound(request)
     with opened(name) as bag:
         pads = [bag.pressures(topic, pressure_field) for topic in names]
-        poses = bag.poses(pose_topic, pose_field) if pose_topic is not None else None
-        wanted = [chain for chain in (tf, truth_tf) if chain is not None]
-        tree = bag.transforms(wanted) if wanted else None
-        bag.read([part for part in (*pads, poses, tree) if part is not None], progress)
-    for pad in pads:
-        pad.require_some(name)
+        poses = [] if pose_topic is None else [bag.poses(pose_topic, pose_field)]
+        tree = bag.transforms([chain for chain in (tf, truth_tf) if chain is not None])
+        parts: list[Any] = [*pads, *poses, tree]
+        bag.read(parts, progress)
     time_s, pressures = together([pad.in_order() for pad in pads])
-    remarks = [remark for pad in pads for remark in pad.remarks(name)]
-    pose_time_s: ArrayLike = ()
-    rows: ArrayLike | None = None
-    truth: ArrayLike | None = None
-    if poses is not None:
-        poses.require_some(name)
-        pose_time_s, rows = poses.in_order()
-        remarks += poses.remarks(name)
-    if truth_tf is not None and tree is not None:
-        truth, moved = tree.still(name, *truth_tf, time_s + pose_delay)
-        remarks += moved
-    if tree is not None:
-        remarks += tree.both(name)
-    if tf is not None and tree is not None:
-        rows = tree.chain(name, *tf, time_s + pose_delay, options["largest_gap_s"])
-        remarks += tree.remarks(name, tf, rows)
-    del pads, poses, tree  # the memory of a long log
-    recording, said = _palpate.import_frames(
-        request, pressures, time_s, pose_time_s, elements_mm, rows, truth
-    )
-    return recording, said + remarks
+    at_s = time_s + pose_delay
+    pose_time_s, rows = poses[0].in_order() if poses else ((), None)
+    truth = None if truth_tf is None else tree.still(*truth_tf, at_s)
+    if tf is not None:
+        rows = tree.poses(*tf, at_s, largest_gap_s)
+    remarks = [remark for part in parts for remark in part.remarks()]
+    del pads, poses, tree, parts  # the memory of a long log
+    recording, said = _palpate.import_frames(request, pressures, time_s, pose_time_s, rows, truth)
+    warn(said + remarks)
+    return recording
 
 
 def topics(log: _Path) -> "list[Topic]":

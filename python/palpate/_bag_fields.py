@@ -1,14 +1,12 @@
 """The readings and poses in messages of a log of ROS, by the fields that hold them."""
 
 import re
-from array import array as numbers
 from collections.abc import Sequence
 from typing import Any
 
 import numpy
-from numpy.typing import NDArray
 
-from ._bag_transforms import in_order, row_of, row_of_numbers, stamp_s
+from ._bag_transforms import Numbers, Rows, row_of, row_of_numbers, stamp_s
 from ._error import Error
 
 #: Fields by which an item of a list is called.
@@ -56,94 +54,107 @@ def _flat(values: Any) -> list[float]:
         values = values.tolist()
     if isinstance(values, (int, float)):
         return [float(values)]
-    flat: list[float] = []
-    for value in values:
-        flat += [float(value)] if isinstance(value, (int, float)) else _flat(value)
-    return flat
+    return [number for value in values for number in _flat(value)]
 
 
-class _Timed:
-    """Messages of one topic, at their headers' times, or at those of their reception."""
+class _Messages:
+    """Rows of numbers of one topic, at the times of the messages' headers, or of their reception."""
 
-    def __init__(self, topic: str, has_header: bool) -> None:
+    def __init__(self, log: str, topic: str, path: str, has_header: bool) -> None:
+        self.where = f"{log}: {topic}"
         self.topics = {topic}
-        self.topic = topic
+        self.path = path  #: of the numbers in a message
         self.has_header = has_header
-        self.received = 0
-        self.time_s = numbers("d")
+        self.received = 0  #: messages without a time of their own
+        self.rows = Rows()
 
-    def time_of(self, message: Any, received_s: float) -> float:
+    def add(self, topic: str, message: Any, received_s: float) -> None:
+        try:
+            row = self._row_of(message)
+        except Error as error:
+            raise Error(f"{self.where}: {self.path or 'the message'}: {error}") from None
         time_s = stamp_s(message.header.stamp) if self.has_header else 0.0
         if time_s <= 0.0:
             self.received += 1
-            return received_s
-        return time_s
+            time_s = received_s
+        self.rows.add(time_s, row)
 
-    def require_some(self, log: str) -> None:
-        if not self.time_s:
-            raise Error(f"{log}: {self.topic}: holds no message; record it, or give another topic")
+    def _row_of(self, message: Any) -> "Sequence[float] | Numbers":
+        raise NotImplementedError
 
-    def remarks(self, log: str) -> list[str]:
+    def in_order(self) -> tuple[Numbers, Numbers]:
+        """Times [n], ascending, and their rows. Raises Error where there are none."""
+        if not len(self.rows):
+            raise Error(f"{self.where}: holds no message; record it, or give another topic")
+        return self.rows.in_order()
+
+    def remarks(self) -> list[str]:
         if not self.received:
             return []
         return [
-            f"{log}: {self.topic}: {self.received} of {len(self.time_s)} messages have no time of their "
-            "own; the times of their reception are taken"
+            f"{self.where}: {self.received} of {len(self.rows)} messages have no time of their own; the "
+            "times of their reception are taken"
         ]
 
 
-class Pressures(_Timed):
-    """The readings of a topic."""
+class Pressures(_Messages):
+    """The readings [e] of a topic, frame by frame."""
 
-    def __init__(self, topic: str, has_header: bool, path: str, flags: str | None) -> None:
-        super().__init__(topic, has_header)
-        self.path = path
+    def __init__(self, log: str, topic: str, path: str, has_header: bool, flags: str | None) -> None:
+        super().__init__(log, topic, path, has_header)
         self.flags = flags  #: where the flags of valid readings lie
         self.invalid = 0  #: readings
         self.elements = 0
-        self.values = numbers("d")  #: frame by frame
 
-    def add(self, topic: str, message: Any, received_s: float) -> None:
-        values = self._field(message, self.path)
+    def _row_of(self, message: Any) -> Numbers:
+        values = _at(message, self.path)
         row = values if hasattr(values, "dtype") and values.ndim == 1 else _flat(values)
-        if not self.time_s:
-            self.elements = len(row)
-            if not self.elements:
-                raise Error(f"{self.topic}: {self.path}: holds no reading; give another field")
+        self.elements = self.elements or len(row)
+        if not self.elements:
+            raise Error("holds no reading; give another field")
         if len(row) != self.elements:
             raise Error(
-                f"{self.topic}: {self.path}: {len(row)} readings in message {len(self.time_s)}, counted "
-                f"from 0, but {self.elements} before; give a topic or a field of one length"
+                f"{len(row)} readings in message {len(self.rows)}, counted from 0, but {self.elements} "
+                "before; give a topic or a field of one length"
             )
         readings = numpy.array(row, numpy.float64)
-        if self.flags is not None:
-            flags = _flat(self._field(message, self.flags))
-            if len(flags) == len(readings):
-                readings[numpy.array(flags) == 0.0] = numpy.nan
-                self.invalid += flags.count(0.0)
-        self.values.frombytes(readings.tobytes())
-        self.time_s.append(self.time_of(message, received_s))
+        flags = [] if self.flags is None else _flat(_at(message, self.flags))
+        if len(flags) == len(readings):
+            readings[numpy.array(flags) == 0.0] = numpy.nan
+            self.invalid += flags.count(0.0)
+        return readings
 
-    def _field(self, message: Any, path: str) -> Any:
+    def remarks(self) -> list[str]:
+        said = f"{self.where}: {self.invalid} readings are unknown by their flags {self.flags}"
+        return super().remarks() + ([said] if self.invalid else [])
+
+
+class Poses(_Messages):
+    """The poses of a topic."""
+
+    def _row_of(self, message: Any) -> Sequence[float]:
         try:
-            return _at(message, path)
-        except Error as error:
-            raise Error(f"{self.topic}: {path}: {error}") from None
+            pose = _at(message, self.path)
+            is_message = hasattr(pose, "__dict__") or hasattr(pose, "__slots__")
+            return row_of(pose) if is_message else row_of_numbers(_flat(pose))
+        except (AttributeError, TypeError):
+            raise Error(
+                "is no pose, no transform, and no list of 7, 12 or 16 numbers; give another pose_field"
+            ) from None
+        except ValueError:
+            raise Error(
+                f"the matrix of message {len(self.rows)}, counted from 0, is no rotation and position; give "
+                "another pose_field"
+            ) from None
 
-    def remarks(self, log: str) -> list[str]:
-        if self.invalid:
-            said = f"{log}: {self.topic}: {self.invalid} readings are unknown by their flags {self.flags}"
-            return [*super().remarks(log), said]
-        return super().remarks(log)
-
-    def in_order(self) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
-        """The frames' times [n], ascending, and their readings [n, e]."""
-        return in_order(self.time_s, self.values, self.elements)
+    def in_order(self) -> tuple[Numbers, Numbers]:
+        """Times, ascending, and the first pose of each, [n, 7]."""
+        time_s, rows = super().in_order()
+        times, first = numpy.unique(time_s, return_index=True)
+        return times, rows[first]
 
 
-def together(
-    pads: Sequence[tuple[NDArray[numpy.float64], NDArray[numpy.float64]]],
-) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
+def together(pads: Sequence[tuple[Numbers, Numbers]]) -> tuple[Numbers, Numbers]:
     """The frames of several pads as those of one array: at the times of the first, with the nearest frame of
     each other, whose readings are unknown where that is over 0.1 s away."""
     (time_s, rows), *others = pads
@@ -157,36 +168,3 @@ def together(
         far = numpy.abs(other_s[nearest] - time_s) > 0.1
         beside.append(numpy.where(far[:, None], numpy.nan, other[nearest]))
     return time_s, numpy.hstack(beside)
-
-
-class Poses(_Timed):
-    """The poses of a topic."""
-
-    def __init__(self, topic: str, has_header: bool, path: str) -> None:
-        super().__init__(topic, has_header)
-        self.path = path
-        self.rows = numbers("d")  #: one behind the other
-
-    def add(self, topic: str, message: Any, received_s: float) -> None:
-        try:
-            pose = _at(message, self.path)
-            row = row_of(pose) if hasattr(pose, "__dict__") or hasattr(pose, "__slots__") else None
-            self.rows.extend(row_of_numbers(_flat(pose)) if row is None else row)
-        except (AttributeError, TypeError):
-            raise Error(
-                f"{self.topic}: {self.path or 'the message'}: is no pose, no transform, and no list of 7, 12 or "
-                "16 numbers; give another pose_field"
-            ) from None
-        except ValueError:
-            raise Error(
-                f"{self.topic}: {self.path}: the matrix of message {len(self.time_s)}, counted from 0, is no "
-                "rotation and position; give another pose_field"
-            ) from None
-        except Error as error:
-            raise Error(f"{self.topic}: {self.path}: {error}") from None
-        self.time_s.append(self.time_of(message, received_s))
-
-    def in_order(self) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]:
-        """Times, ascending, and the first pose of each, [n, 7]."""
-        times, first = numpy.unique(numpy.frombuffer(self.time_s), return_index=True)
-        return times, numpy.frombuffer(self.rows).reshape(-1, 7)[first]

@@ -36,7 +36,9 @@ _POSES = {
 #: Lists of flags beside the readings that say which of them are valid.
 _FLAGS = ("valid", "validity", "is_valid", "mask", "valid_mask")
 #: Kinds of fields in definitions of rosbags: Nodetype.
-_BASE, _NAME, _LISTS = 1, 2, (3, 4)
+_NAME, _LISTS = 2, (3, 4)
+#: What mends a log that was cut off.
+_MENDED_BY = {".bag": "rosbag reindex {}", ".mcap": "mcap recover {} -o MENDED.mcap"}
 _TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
@@ -58,115 +60,98 @@ class Bag:
         self.name = name
         self.reader = reader
 
-    def connections(self, topic: str) -> list[Any]:
-        found = [connection for connection in self.reader.connections if connection.topic == topic]
-        if not found:
-            known = sorted({connection.topic for connection in self.reader.connections})
-            raise Error(f"{self.name}: has no topic {topic}; it has {', '.join(known) or 'none'}")
-        return found
+    def type_of(self, topic: str) -> str:
+        topics = self.reader.topics
+        if topic not in topics:
+            raise Error(f"{self.name}: has no topic {topic}; it has {', '.join(topics) or 'none'}")
+        return str(topics[topic].connections[0].msgtype)
 
-    def fields(self, msgtype: str) -> list[tuple[str, Any]]:
-        return list(self.reader.typestore.fielddefs[msgtype][1])
+    def fields(self, msgtype: str) -> dict[str, Any]:
+        return dict(self.reader.typestore.fielddefs[msgtype][1])
 
     def has_header(self, msgtype: str) -> bool:
-        return any(
-            name == "header" and kind[1] == "std_msgs/msg/Header" for name, kind in self.fields(msgtype)
-        )
+        _, kind = self.fields(msgtype).get("header", (0, ""))
+        return bool(kind == "std_msgs/msg/Header")
 
-    def lists(self, msgtype: str, path: str = "", within: tuple[str, ...] = ()) -> Iterator[str]:
-        """The dotted paths of lists of numbers, also of one number in each item of a list."""
-        for name, (kind, what) in self.fields(msgtype):
+    def lists(
+        self, msgtype: str, path: str = "", in_list: bool = False, within: tuple[str, ...] = ()
+    ) -> Iterator[tuple[str, str]]:
+        """The dotted paths of lists of numbers, also of one number in each item of a list, and the name of the
+        flags beside each; "" where there are none."""
+        fields = self.fields(msgtype)
+        flags = next((name for name in _FLAGS if name in fields), "")
+        for name, (kind, what) in fields.items():
             here = f"{path}.{name}" if path else name
-            if name == "header" or (kind == _NAME and what in within):
-                continue
-            if kind == _NAME:
-                yield from self.lists(what, here, (*within, msgtype))
-            elif kind in _LISTS and what[0][0] == _NAME:
-                inner = what[0][1]
-                if inner not in within and not inner.endswith("/MultiArrayDimension"):
-                    yield from self.lists(inner, here, (*within, msgtype))
-                    yield from (
-                        f"{here}.{member}"
-                        for member, (of, base) in self.fields(inner)
-                        if of == _BASE and base[0].startswith(("float", "int", "uint"))
-                    )
-            elif kind in _LISTS and what[0][1][0].startswith(("float", "int", "uint")):
-                yield here
+            is_list = kind in _LISTS
+            of, inner = what[0] if is_list else (kind, what)
+            if of == _NAME:
+                if name != "header" and inner not in within and not inner.endswith("/MultiArrayDimension"):
+                    yield from self.lists(inner, here, is_list, (*within, msgtype))
+            elif (is_list or in_list) and inner[0].startswith(("float", "int", "uint")):
+                yield here, flags
 
     def pressure_path(self, msgtype: str) -> str | None:
         """Where the pressures of a type lie; None where several lists may be meant, or none."""
-        found = list(self.lists(msgtype))
+        found = dict(self.lists(msgtype))
         known = _PRESSURES.get(msgtype)
         readings = [path for path in found if path.rpartition(".")[2] not in _FLAGS]
         return known if known in found else readings[0] if len(readings) == 1 else None
 
-    def flags(self, msgtype: str, path: str) -> str | None:
-        """Where the flags beside the readings of a path lie."""
-        beside = path.rpartition(".")[0]
-        of = msgtype
-        for field in filter(None, _without_keys(beside).split(".")):
-            kind, what = dict(self.fields(of))[field]
-            of = what if kind == _NAME else what[0][1]
-        names = dict(self.fields(of))
-        return next((f"{beside}.{name}".lstrip(".") for name in _FLAGS if name in names), None)
-
     def pressures(self, topic: str, path: str | None) -> Pressures:
-        msgtype = self.connections(topic)[0].msgtype
+        msgtype = self.type_of(topic)
+        where = f"{self.name}: {topic}: {msgtype}"
         if path is None:
             path = self.pressure_path(msgtype)
-        found = list(self.lists(msgtype))
+        found = dict(self.lists(msgtype))
         if path is None and found:
-            raise Error(
-                f"{self.name}: {topic}: {msgtype} has the lists {', '.join(found)}; name one by "
-                "pressure_field"
-            )
+            raise Error(f"{where} has the lists {', '.join(found)}; name one by pressure_field")
         if path is None or _without_keys(path) not in found:
             raise Error(
-                f"{self.name}: {topic}: {msgtype} has no list of numbers"
+                f"{where} has no list of numbers"
                 + (f" {path}; it has {', '.join(found)}" if path and found else "; give another topic")
             )
-        return Pressures(topic, self.has_header(msgtype), path, self.flags(msgtype, path))
+        flags = found[_without_keys(path)]
+        beside = f"{path.rpartition('.')[0]}.{flags}".lstrip(".") if flags else None
+        return Pressures(self.name, topic, path, self.has_header(msgtype), beside)
 
     def poses(self, topic: str, path: str | None) -> Poses:
-        msgtype = self.connections(topic)[0].msgtype
+        msgtype = self.type_of(topic)
+        where = f"{self.name}: {topic}: {msgtype}"
         first = re.split(r"[.[]", path or "")[0]
         if path is None and msgtype not in _POSES:
             raise Error(
-                f"{self.name}: {topic}: {msgtype} is no pose; name its field by pose_field, give a topic of "
+                f"{where} is no pose; name its field by pose_field, give a topic of "
                 f"{', '.join(sorted(_POSES))}, or frames by tf"
             )
-        if first and first not in (fields := dict(self.fields(msgtype))):
-            raise Error(f"{self.name}: {topic}: {msgtype} has no field {first}; it has {', '.join(fields)}")
-        return Poses(topic, self.has_header(msgtype), _POSES[msgtype] if path is None else path)
+        if first and first not in (fields := self.fields(msgtype)):
+            raise Error(f"{where} has no field {first}; it has {', '.join(fields)}")
+        return Poses(self.name, topic, _POSES[msgtype] if path is None else path, self.has_header(msgtype))
 
     def transforms(self, wanted: list[tuple[str, str]]) -> Transforms:
-        topics = {c.topic for c in self.reader.connections if c.msgtype in _TRANSFORMS}
-        if not topics:
+        """The frames of all topics of transforms, of which these chains are wanted."""
+        topics = {c.topic for c in self.reader.connections if c.msgtype in _TRANSFORMS if wanted}
+        if wanted and not topics:
             raise Error(
                 f"{self.name}: tf {':'.join(wanted[0])}: the log has no topic of transforms; give "
                 "pose_topic"
             )
         static = {topic for topic in topics if topic.endswith("tf_static")}
-        return Transforms(topics, static, wanted)
+        return Transforms(self.name, topics, static, wanted)
 
     def read(
         self, parts: Sequence[Pressures | Poses | Transforms], progress: Callable[[float], object] | None
     ) -> None:
-        takers: dict[str, list[Any]] = {}
-        for part in parts:
-            for topic in part.topics:
-                takers.setdefault(topic, []).append(part)
-        connections = [c for c in self.reader.connections if c.topic in takers]
+        """Gives every message of the parts' topics to them."""
+        connections = [c for c in self.reader.connections if any(c.topic in part.topics for part in parts)]
         total = max(1, sum(c.msgcount for c in connections))
-        done = 0
-        for topic, received_s, message in self.messages(connections):
-            for part in takers[topic]:
-                part.add(topic, message, received_s)
-            done += 1
+        for done, (topic, received_s, message) in enumerate(self._messages(connections), start=1):
+            for part in parts:
+                if topic in part.topics:
+                    part.add(topic, message, received_s)
             if progress is not None and done % 1000 == 0:
                 progress(done / total)
 
-    def messages(self, connections: list[Any]) -> Iterator[tuple[str, float, Any]]:
+    def _messages(self, connections: list[Any]) -> Iterator[tuple[str, float, Any]]:
         """Topic, time of reception and message of each."""
         with _readable(self.name):
             for connection, received_ns, data in self.reader.messages(connections):
@@ -175,24 +160,19 @@ class Bag:
 
     def topics(self) -> list[Topic]:
         duration_s = 1e-9 * self.reader.duration
-        counts: dict[tuple[str, str], int] = {}
-        for connection in self.reader.connections:
-            key = (connection.topic, connection.msgtype)
-            counts[key] = counts.get(key, 0) + connection.msgcount
         found = []
-        for (topic, msgtype), count in sorted(counts.items()):
-            guess = (
-                "transforms"
-                if msgtype in _TRANSFORMS
-                else "poses"
-                if msgtype in _POSES
-                else "pressures"
-                if self.pressure_path(msgtype)
-                else ""
-            )
+        for name, topic in self.reader.topics.items():
+            msgtype, count = self.type_of(name), topic.msgcount
             rate = (count - 1) / duration_s if count > 1 and duration_s > 0.0 else 0.0
-            found.append(Topic(topic, msgtype, count, rate, guess))
+            found.append(Topic(name, msgtype, count, rate, self._guess(msgtype)))
         return found
+
+    def _guess(self, msgtype: str) -> str:
+        if msgtype in _TRANSFORMS:
+            return "transforms"
+        if msgtype in _POSES:
+            return "poses"
+        return "pressures" if self.pressure_path(msgtype) else ""
 
 
 @contextmanager
@@ -203,16 +183,10 @@ def _readable(name: str) -> Iterator[None]:
     except Exception as error:  # a damaged bag may fail anywhere in rosbags
         memory = isinstance(error, MemoryError)  # for a length that is damaged, in all likelihood
         why = "a part of it does not fit into memory" if memory else str(error) or type(error).__name__
-        mend = (
-            f"'rosbag reindex {name}'"
-            if name.endswith(".bag")
-            else f"'mcap recover {name} -o MENDED.mcap'"
-            if name.endswith(".mcap")
-            else "'ros2 bag reindex'"
-        )
+        mend = _MENDED_BY.get(Path(name).suffix, "ros2 bag reindex").format(name)
         raise Error(
             f"{name}: cannot be read as a bag ({why}); copy it again, or, where its recording was cut off, mend "
-            f"it by {mend}"
+            f"it by '{mend}'"
         ) from None
 
 
@@ -222,19 +196,6 @@ def _zstd() -> Any:
         with contextlib.suppress(ImportError):
             return importlib.import_module(name)
     raise Error("a reader of Zstandard is missing; pip install 'palpate[bag]'")
-
-
-@contextmanager
-def _unpacked(name: str) -> Iterator[Path]:
-    """The log's path, of one that is compressed as a whole that of a copy, which goes."""
-    if not name.endswith(".zstd") and not name.endswith(".zst"):
-        yield Path(name)
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / Path(name).stem
-        with _readable(name), _zstd().open(name, "rb") as packed, path.open("wb") as plain:
-            shutil.copyfileobj(packed, plain)
-        yield path
 
 
 @contextmanager
@@ -249,10 +210,14 @@ def opened(name: str) -> Iterator[Bag]:
     if not path.exists():
         raise Error(f"{name}: no such file or folder; give a bag")
     if (path.parent / "metadata.yaml").exists() and re.search(r"\.(db3|mcap)(\.zstd?)?$", name):
-        name = os.fspath(path.parent)
-    with _unpacked(name) as unpacked:
-        with _readable(os.fspath(path)):
-            reader = AnyReader([unpacked], default_typestore=get_typestore(Stores.LATEST))
+        path = path.parent
+    name = os.fspath(path)
+    with contextlib.ExitStack() as stack:
+        if name.endswith((".zstd", ".zst")):  # compressed as a whole: a copy is read, which goes
+            path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / path.stem
+            with _readable(name), _zstd().open(name, "rb") as packed, path.open("wb") as plain:
+                shutil.copyfileobj(packed, plain)
+        with _readable(name):
+            reader = AnyReader([path], default_typestore=get_typestore(Stores.LATEST))
             reader.open()
-        with contextlib.closing(reader):
-            yield Bag(os.fspath(path), reader)
+        yield Bag(name, stack.enter_context(contextlib.closing(reader)))

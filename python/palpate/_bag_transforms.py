@@ -1,7 +1,7 @@
 """Poses in space over time, and the tree of frames that /tf and /tf_static give."""
 
 import math
-from array import array as numbers
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from . import _palpate
 from ._error import Error
 
-Rows = NDArray[numpy.float64]  #: [n, 7] mm, and a quaternion x, y, z, w; NaN where unknown
+Numbers = NDArray[numpy.float64]  #: poses are [n, 7] mm, and a quaternion x, y, z, w; NaN where unknown
 _UNKNOWN = (math.nan,) * 7
 _USUAL_GAP_S = 0.1
 _STILL = 1.0  #: mm, and degrees, by which an object that lies still may seem to move
@@ -50,39 +50,49 @@ def stamp_s(stamp: Any) -> float:
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
 
-def in_order(times: "numbers[float]", values: "numbers[float]", width: int) -> tuple[Rows, Rows]:
-    """Times [n], ascending, and rows [n, width] of values that lie one behind the other."""
-    time_s: Rows = numpy.frombuffer(times)
-    rows: Rows = numpy.frombuffer(values).reshape(-1, width)
-    if numpy.any(time_s[1:] < time_s[:-1]):
-        order = numpy.argsort(time_s, kind="stable")
-        time_s, rows = time_s[order], rows[order]
-    return time_s, rows
+class Rows:
+    """Rows of numbers at times, as they come, with eight bytes for each number of a long log."""
+
+    def __init__(self) -> None:
+        self.time_s = array("d")
+        self.numbers = array("d")  #: row by row
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def add(self, time_s: float, row: "Sequence[float] | Numbers") -> None:
+        self.time_s.append(time_s)
+        self.numbers.frombytes(numpy.asarray(row, numpy.float64).tobytes())
+
+    def in_order(self) -> tuple[Numbers, Numbers]:
+        """Times [n], ascending, and their rows."""
+        time_s: Numbers = numpy.frombuffer(self.time_s)
+        width = len(self.numbers) // max(1, len(self))
+        rows: Numbers = numpy.frombuffer(self.numbers).reshape(len(self), width)
+        if numpy.any(time_s[1:] < time_s[:-1]):
+            order = numpy.argsort(time_s, kind="stable")
+            time_s, rows = time_s[order], rows[order]
+        return time_s, rows
 
 
 @dataclass
 class _Edge:
-    """T_parent_child over time; of a static one there is a single row."""
+    """T_parent_child over time; a static one has a single row."""
 
     parent: str
     static: bool
     moves: bool = False  #: although /tf_static has it, too
-    time_s: "numbers[float]" = field(default_factory=lambda: numbers("d"))
-    rows: "numbers[float]" = field(default_factory=lambda: numbers("d"))  #: one behind the other
-
-    def log(self) -> tuple[Rows, Rows]:
-        """Times, ascending, and rows."""
-        return in_order(self.time_s, self.rows, 7)
+    rows: Rows = field(default_factory=Rows)
 
 
-def _gap_s(time_s: Rows) -> float:
+def _gap_s(time_s: Numbers) -> float:
     """The longest step that a regular log takes when its steps jitter or a message is lost."""
     steps = numpy.sort(numpy.diff(time_s))
     return max(_USUAL_GAP_S, 2.5 * float(steps[len(steps) // 2])) if len(steps) else _USUAL_GAP_S
 
 
-def _interpolated(log: tuple[Rows, Rows], at_s: Rows, gap_s: float) -> Rows:
-    """Rows at times; NaN outside the log or between rows further apart than the gap.
+def _interpolated(log: tuple[Numbers, Numbers], at_s: Numbers, gap_s: float) -> Numbers:
+    """Numbers at times; NaN outside the log or between rows further apart than the gap.
 
     The position is on the line and the rotation on the shorter arc between two rows.
     """
@@ -108,14 +118,14 @@ def _interpolated(log: tuple[Rows, Rows], at_s: Rows, gap_s: float) -> Rows:
     return numpy.where(known[:, None], numpy.hstack([p, q]), math.nan)
 
 
-def _turned(rotation: Rows, vector: Rows) -> Rows:
+def _turned(rotation: Numbers, vector: Numbers) -> Numbers:
     """Vectors [n, 3] turned by rotations [n, 4]."""
     q, w = rotation[:, :3], rotation[:, 3:]
     t = 2.0 * numpy.cross(q, vector)
     return vector + w * t + numpy.cross(q, t)
 
 
-def _product(a: Rows, b: Rows) -> Rows:
+def _product(a: Numbers, b: Numbers) -> Numbers:
     """T_a_c from T_a_b and T_b_c."""
     p, q, w = a[:, :3], a[:, 3:6], a[:, 6:]
     r, z = b[:, 3:6], b[:, 6:]
@@ -124,7 +134,7 @@ def _product(a: Rows, b: Rows) -> Rows:
     return numpy.hstack([position, w * r + z * q + numpy.cross(q, r), scalar])
 
 
-def _inverse(a: Rows) -> Rows:
+def _inverse(a: Numbers) -> Numbers:
     back = a[:, 3:] * (-1.0, -1.0, -1.0, 1.0)
     return numpy.hstack([-_turned(back, a[:, :3]), back])
 
@@ -132,17 +142,20 @@ def _inverse(a: Rows) -> Rows:
 class Transforms:
     """The frames of /tf and /tf_static, by their names without a leading slash.
 
-    A frame that both have is one that moves: its transforms of /tf count alone. Once the wanted chains are complete, other frames' transforms are not kept.
+    A frame that both have is one that moves: its transforms of /tf count alone. Once the wanted chains are
+    complete, other frames' transforms are not kept.
     """
 
     def __init__(
-        self, topics: set[str], static: set[str], wanted: Sequence[tuple[str, str]]
+        self, log: str, topics: set[str], static: set[str], wanted: Sequence[tuple[str, str]]
     ) -> None:
+        self.log = log
         self.topics = topics
         self.static = static
         self.wanted = [(target.lstrip("/"), source.lstrip("/")) for target, source in wanted]
         self.edges: dict[str, _Edge] = {}  #: by child
         self.kept: set[str] | None = None  #: children of the wanted chains; None: not all are known
+        self.said: list[str] = []  #: of chains, what is worth a warning
 
     def add(self, topic: str, message: Any, received_s: float) -> None:
         for transform in message.transforms:
@@ -159,12 +172,12 @@ class Transforms:
                 edge = self.edges[child] = _Edge(parent, static, moves=edge is not None and edge.moves)
                 self._keep_chains()
             if edge.static:
-                edge.rows = numbers("d", row_of(transform.transform))
+                edge.rows = Rows()
+                edge.rows.add(0.0, row_of(transform.transform))
             elif self.kept is None or child in self.kept:
                 row = row_of(transform.transform)
                 if not math.isnan(row[3]):
-                    edge.time_s.append(stamp_s(transform.header.stamp) or received_s)
-                    edge.rows.extend(row)
+                    edge.rows.add(stamp_s(transform.header.stamp) or received_s, row)
 
     def _keep_chains(self) -> None:
         """Forgets what the wanted chains do not need, now that a frame has a parent."""
@@ -174,8 +187,8 @@ class Transforms:
             return
         self.kept = {child for chain in chains if chain for up in chain for child in up}
         for child in self.edges.keys() - self.kept:
-            edge = self.edges[child]
-            self.edges[child] = edge if edge.static else _Edge(edge.parent, False, edge.moves)
+            if not self.edges[child].static:
+                self.edges[child].rows = Rows()
 
     def _path(self, target: str, source: str) -> tuple[list[str], list[str]] | None:
         """Frames from the source up to below the common ancestor, and from the target."""
@@ -190,22 +203,21 @@ class Transforms:
             return None
         return ups[0][: ups[0].index(common)], ups[1][: ups[1].index(common)]
 
-    def chain(
-        self, log: str, target: str, source: str, time_s: Rows, gap_s: float | None
-    ) -> Rows:
+    def _chain(self, target: str, source: str, time_s: Numbers, gap_s: float | None) -> Numbers:
         """T_target_source at each time, [n, 7]; NaN where it is not known."""
+        where = f"{self.log}: tf {target}:{source}"
         path = self._path(target.lstrip("/"), source.lstrip("/"))
         if path is None:
             known = sorted({*self.edges, *(edge.parent for edge in self.edges.values())})
             raise Error(
-                f"{log}: tf {target}:{source}: no chain of transforms joins these frames; the log has "
-                f"{', '.join(known) or 'none'}; where the array's mount is not among them, name the frame "
-                "that carries it and give the mount"
+                f"{where}: no chain of transforms joins these frames; the log has "
+                f"{', '.join(known) or 'none'}; where the array's mount is not among them, name the frame that "
+                "carries it and give the mount"
             )
-        logs = {child: self.edges[child].log() for up in path for child in up}
+        logs = {child: self.edges[child].rows.in_order() for up in path for child in up}
         gaps = {child: _gap_s(at_s) if gap_s is None else gap_s for child, (at_s, _) in logs.items()}
 
-        def up_to_common(up: list[str], at_s: Rows) -> Rows:
+        def up_to_common(up: list[str], at_s: Numbers) -> Numbers:
             product = numpy.tile((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), (len(at_s), 1))
             for child in up:
                 if self.edges[child].static:
@@ -221,44 +233,41 @@ class Transforms:
             source_up, target_up = (up_to_common(up, at_s) for up in path)
             rows[begin : begin + _BLOCK] = _product(_inverse(target_up), source_up)
         if numpy.isnan(rows[:, 0]).all():
-            raise Error(
-                f"{log}: tf {target}:{source}: is not known at any frame's time; check the clocks"
+            raise Error(f"{where}: is not known at any frame's time; check the clocks")
+        return rows
+
+    def poses(self, target: str, source: str, time_s: Numbers, gap_s: float | None) -> Numbers:
+        """T_target_source of the sensor at each frame's time, [n, 7]; NaN where it is not known."""
+        rows = self._chain(target, source, time_s, gap_s)
+        if unknown := int(numpy.isnan(rows[:, 0]).sum()):
+            self.said.append(
+                f"{self.log}: tf {target}:{source}: {unknown} of {len(rows)} frames have no pose, as a "
+                "transform is missing, or the ones around them are too far apart (largest_gap_s)"
             )
         return rows
 
-    def still(
-        self, log: str, target: str, source: str, time_s: Rows
-    ) -> tuple[Rows | None, list[str]]:
-        """T_target_source of a frame that lies still while the frames come, or None and why."""
-        rows = self.chain(log, target, source, numpy.unique(time_s), None)
+    def still(self, target: str, source: str, time_s: Numbers) -> Numbers | None:
+        """T_target_source [7] of a frame that lies still while the frames come; None of one that moves."""
+        rows = self._chain(target, source, numpy.unique(time_s), None)
         rows = rows[~numpy.isnan(rows[:, 0])]
-        middle: Rows = rows[len(rows) // 2]
+        middle: Numbers = rows[len(rows) // 2]
         distance_mm = numpy.linalg.norm(rows[:, :3] - middle[:3], axis=1)
         cosine = numpy.abs(rows[:, 3:] @ middle[3:])
         angle_deg = numpy.degrees(2.0 * numpy.arccos(numpy.minimum(1.0, cosine)))
         # A tracker's outliers are no motion.
         if max(numpy.quantile(distance_mm, 0.95), numpy.quantile(angle_deg, 0.95)) <= _STILL:
-            return middle, []
-        return None, [
-            f"{log}: truth_tf {target}:{source}: the frame moves by {distance_mm.max():.1f} mm and "
+            return middle
+        self.said.append(
+            f"{self.log}: truth_tf {target}:{source}: the frame moves by {distance_mm.max():.1f} mm and "
             f"{angle_deg.max():.1f}°, so that the recording has no truth; give a log in which the object "
             "lies still"
-        ]
+        )
+        return None
 
-    def both(self, log: str) -> list[str]:
-        """Which frames of the wanted chains are in /tf and in /tf_static."""
-        return [
-            f"{log}: the frame {child} is in /tf_static, but moves in /tf: its transforms of /tf are taken"
+    def remarks(self) -> list[str]:
+        """What is worth a warning of the chains that were asked for, and of their frames."""
+        return self.said + [
+            f"{self.log}: the frame {child} is in /tf_static, but moves in /tf: its transforms of /tf are taken"
             for child in sorted(self.kept or ())
             if self.edges[child].moves
-        ]
-
-    def remarks(self, log: str, chain: tuple[str, str], rows: Rows) -> list[str]:
-        """What is worth saying of rows that chain() gave."""
-        unknown = int(numpy.isnan(rows[:, 0]).sum())
-        if not unknown:
-            return []
-        return [
-            f"{log}: tf {':'.join(chain)}: {unknown} of {len(rows)} frames have no pose, as a "
-            "transform is missing, or the ones around them are too far apart (largest_gap_s)"
         ]

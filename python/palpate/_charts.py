@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from ._program import Json, write
+from ._tables import column, value_of
 
 #: Colours of Okabe and Ito, who chose them for every kind of colour vision.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
@@ -62,6 +63,15 @@ def ticks(axis: Axis, text: Callable[[float], str], steps: Sequence[float] = (1.
     axis.set_major_locator(LogLocator(subs=steps, numticks=20))
     axis.set_major_formatter(lambda value, _: text(value))
     axis.set_minor_formatter(NullFormatter())
+
+
+def series(
+    axes: Axes, records: Sequence[Json], x: str, y: str, label: str, scale: float = 1.0, **look: Any
+) -> str:
+    """What paths find in the records that have y, as a line with a look; its colour."""
+    records = [record for record in records if value_of(record, y) is not None]
+    (line,) = axes.plot(column(records, x), scale * column(records, y), label=label, **look)
+    return str(line.get_color())
 
 
 def rule(axes: Axes, at: float, label: str, *, vertical: bool = False, colour: str = GREY) -> None:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, overload
 
 from . import _palpate
 from ._palpate import Truth
+from .results import Drawn
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
     import os
 
     import numpy
-    from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
 
 
@@ -99,11 +99,12 @@ _AXES = {
 }
 
 
-class Recording(_OverArrays):
+class Recording(_OverArrays, Drawn):
     """A sequence of readings of one array pressed against one object.
 
     Its arrays are those that were given, where dtype and layout allow; recording[i] is a Touch, and
-    recording[a:b] a Recording over the same memory.
+    recording[a:b] a Recording over the same memory. plot(ax=None) draws every reading at its element's place in
+    the robot frame, in mm, with Matplotlib, and returns the axes.
     """
 
     _free = ("object", "truth")
@@ -169,6 +170,8 @@ class Recording(_OverArrays):
         from ._arrays import Reader
 
         reader = Reader()
+        texts = {"object": object, "pressure_unit": pressure_unit, "rows": rows, "truth": truth, "sensor": sensor,
+                 "serial": serial}  # fmt: skip
         self.__dict__.update(
             pressure=reader.readings(pressure, "pressure", ("n", "e")),
             T_robot_sensor=reader.floats(poses, "poses", ("n", "3")),
@@ -183,17 +186,7 @@ class Recording(_OverArrays):
                     ("lost_before", lost_before, reader.counts, "n"),
                 )
             },
-            **{
-                name: _checked(name, given)
-                for name, given in (
-                    ("object", object),
-                    ("pressure_unit", pressure_unit),
-                    ("rows", rows),
-                    ("truth", truth),
-                    ("sensor", sensor),
-                    ("serial", serial),
-                )
-            },
+            **{name: _checked(name, given) for name, given in texts.items()},
             path="",
             closed=True,
             _findings=[],
@@ -236,13 +229,6 @@ class Recording(_OverArrays):
         """Writes a recording file (HDF5), whole or not at all. Raises Error where the content is not sound or
         the file cannot be written."""
         _palpate.write_recording(path, self)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws every reading at its element's place in the robot frame, in mm, with Matplotlib. Returns the
-        axes."""
-        from .plots import plot
-
-        return plot(self, ax)
 
     def __repr__(self) -> str:
         n, e = self.pressure.shape

@@ -46,7 +46,7 @@ class Data:
         """The batch of all recordings on given bins."""
         x, y, theta = lattice.x_mm, lattice.y_mm, lattice.theta_rad
         return self.open(
-            bins=counts_of(lattice),
+            bins=lattice.shape[::-1],
             x_mm=(x.lower, x.upper),
             y_mm=(y.lower, y.upper),
             theta_deg=(math.degrees(theta.lower), math.degrees(theta.upper)),
@@ -71,42 +71,26 @@ class Data:
         return records, median_low([seconds for _, _, seconds in lines[:unknowns]])
 
 
-def counts_of(lattice: PoseLattice) -> tuple[int, int, int]:
-    return lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count
-
-
 def lattices_of(fine: PoseLattice, most_bins: int) -> list[PoseLattice]:
     """Lattices of the region in the proportions of `fine`, by rising count.
 
     Up to three times as many bins; each has about three times as many as the one before.
     """
-    finest = min(3.0 * fine.bins, float(most_bins))
-    free = max(1, sum(count > 1 for count in counts_of(fine)))
+    count = min(3.0 * fine.bins, float(most_bins))
+    fewest = 0.9 * min(_FEWEST_BINS, count / 30.0)  # counts of bins are near to what is asked for
+    free = max(1, sum(n > 1 for n in fine.shape))
     lattices: list[PoseLattice] = []
-    count = finest
-    while count >= 0.9 * min(
-        _FEWEST_BINS, finest / 30.0
-    ):  # counts of bins are near to what is asked for
+    while count >= fewest:
         factor = (count / fine.bins) ** (1.0 / free)
-        axes = [
+        x, y, theta = (
             (axis.lower, axis.upper, max(1, math.floor(factor * axis.count + 0.5)))
             for axis in (fine.x_mm, fine.y_mm, fine.theta_rad)
-        ]
-        x, y, theta = axes
+        )
         lattice = PoseLattice(x, y, theta, fine.pivot_mm)
         if not lattices or lattice.bins < lattices[-1].bins:
             lattices.append(lattice)
         count /= math.sqrt(10.0)
     return lattices[::-1]
-
-
-def _distance_mm(data: Data, kind: str, record: Record, other: Record) -> float | None:
-    """How far the modes or the refined poses of two records lie apart; None for other objects."""
-    here, there = ((of["mode"]["map"], of["mode"].get("mirrored", False)) for of in (record, other))
-    if here != there or kind not in record or kind not in other:
-        return None
-    a, b = ([of[kind][name] for name in ("x_mm", "y_mm", "theta_rad")] for of in (record, other))
-    return float(pose_error_mm(data.maps[here].map, a, b))
 
 
 @dataclass
@@ -123,10 +107,17 @@ class Run:
     def compare_with(self, finest: "Run", data: Data) -> None:
         """Says how far the poses lie from those of the finest run."""
         pairs = list(zip(self.records, finest.records, strict=True))
+
+        def distance_mm(kind: str, *records: Record) -> float | None:
+            here, there = ((of["mode"]["map"], of["mode"].get("mirrored", False)) for of in records)
+            if here != there or any(kind not in of for of in records):
+                return None
+            poses = ([of[kind][name] for name in ("x_mm", "y_mm", "theta_rad")] for of in records)
+            return float(pose_error_mm(data.maps[here].map, *poses))
+
         for kind, name in (("mode", "from_finest_mm"), ("refined", "refined_from_finest_mm")):
-            distances = [_distance_mm(data, kind, record, other) for record, other in pairs]
-            self.from_finest_mm[kind] = distances
-            self.point[name] = errors_over(distances, 20)
+            self.from_finest_mm[kind] = [distance_mm(kind, *pair) for pair in pairs]
+            self.point[name] = errors_over(self.from_finest_mm[kind], 20)
         same = sum(record["best"] == other["best"] for record, other in pairs)
         self.point["same_object"] = same / len(pairs)
 
@@ -143,40 +134,37 @@ def measure(data: Data, lattice: PoseLattice, dense: int) -> Run:
     All by the histogram where the search by bounds would take too much memory, or objects slip.
     """
     unknowns = sum(count for _, count in data.entries)
-    in_all = lattice.bins * len(data.maps)
-    point: Document = {
-        "count": lattice.bins,
-        "bins": list(counts_of(lattice)),
-        "bins_in_all": in_all,
-        "step_mm": max(lattice.x_mm.step, lattice.y_mm.step),
-        "recordings": unknowns,
-        "histogram_recordings": 0,
-        **dict.fromkeys(("seconds_histogram", "seconds_bounds", "device_bytes", "host_bytes")),
-    }
+    point: Document = dict.fromkeys(("seconds_histogram", "seconds_bounds", "device_bytes", "host_bytes"))
     records: list[Record] = []
     try:
         bounds = data.on(lattice, "bounded")
+        by_bounds = bounds.on_host
     except Error:
-        bounds = None
-    if bounds is not None and not bounds.on_host:
-        bounds = None
+        by_bounds = False
     # Half of the device's memory, as --bins auto has it.
-    if in_all <= min(_MOST_HISTOGRAM, data.device.memory_bytes // 16) or bounds is None:
+    room = lattice.bins * len(data.maps) <= min(_MOST_HISTOGRAM, data.device.memory_bytes // 16)
+    dense = (min(dense, unknowns) if room else 0) if by_bounds else unknowns
+    if dense:
         histogram = data.on(lattice, "histogram")
-        count = unknowns if bounds is None else min(dense, unknowns)
-        records, point["seconds_histogram"] = data.recognize(histogram, count)
-        point |= {"histogram_recordings": count, "device_bytes": histogram.memory_bytes}
+        records, point["seconds_histogram"] = data.recognize(histogram, dense)
+        point["device_bytes"] = histogram.memory_bytes
         del histogram
-    if bounds is not None:
+    if by_bounds:
         records, point["seconds_bounds"] = data.recognize(bounds, unknowns)
         point["host_bytes"] = bounds.memory_bytes
     known = [record["right"] for record in records if record.get("right") is not None]
-    point |= {"labelled": len(known), "accuracy": sum(known) / len(known) if known else None}
-    point["trials"] = len(records)
+    sd = [record["refined"]["sd"] for record in records if "refined" in record]
+    point |= {
+        "count": lattice.bins,
+        "bins": list(lattice.shape[::-1]),
+        "step_mm": max(lattice.x_mm.step, lattice.y_mm.step),
+        "recordings": unknowns,
+        "histogram_recordings": dense,
+        "accuracy": sum(known) / len(known) if known else None,
+        "sd_mm": median_low([math.hypot(x, y) for x, y, _ in sd]) if sd else None,
+        "sd_deg": median_low([math.degrees(theta) for _, _, theta in sd]) if sd else None,
+    }
     for name in ("error", "refined_error"):
         errors = [record.get(f"{name}_mm") for record in records]
         point |= {f"{name}_mm": errors_over(errors, 20), f"{name}s_mm": errors}
-    sd = [record["refined"]["sd"] for record in records if "refined" in record]
-    point["sd_mm"] = median_low([math.hypot(x, y) for x, y, _ in sd]) if sd else None
-    point["sd_deg"] = median_low([math.degrees(theta) for _, _, theta in sd]) if sd else None
     return Run(lattice, records, point)

@@ -1,6 +1,6 @@
 """Markdown tables of records, and how their values are written."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy
@@ -33,14 +33,9 @@ def seconds_text(seconds: float) -> str:
     return f"{1e3 * seconds:.3g} ms" if seconds >= 0.9995e-3 else f"{1e6 * seconds:.3g} us"
 
 
-def mean_text(errors: dict[str, float]) -> str:
+def mean_text(errors: dict[str, float], sign: str = "") -> str:
     """Such as "0.137 ± 0.011", of a mean and its standard error."""
-    return f"{errors['mean']:.3f} ± {errors['standard_error']:.3f}"
-
-
-def difference_text(errors: dict[str, float]) -> str:
-    """Such as "-0.015 ± 0.005": a mean with its sign, and its standard error."""
-    return f"{errors['mean']:+.3f} ± {errors['standard_error']:.3f}"
+    return f"{errors['mean']:{sign}.3f} ± {errors['standard_error']:.3f}"
 
 
 def number(form: str, factor: float = 1.0) -> Text:
@@ -68,27 +63,21 @@ def column(records: Any, path: str) -> NDArray[numpy.float64]:
     return numpy.array(values(records), numpy.float64)
 
 
-def texts(columns: Sequence[Column], record: Any) -> list[str]:
-    """The cells of a row; a dash where there is nothing."""
-    values = [value_of(record, path) for _, path, _ in columns]
-    return ["–" if v is None else text(v) for v, (_, _, text) in zip(values, columns, strict=True)]
-
-
 class Table(list[Any]):
-    """Records that are printed as they are added: rows of a table, after an empty line and its head."""
+    """Records that are printed as they are added: rows of a table, after an empty line and its head.
 
-    def __init__(self, columns: Sequence[Column]) -> None:
+    A dash stands where a record has nothing.
+    """
+
+    def __init__(self, columns: Sequence[Column], records: Iterable[Any] = ()) -> None:
         self._columns = columns
-        print(f"\n| {' | '.join(head for head, _, _ in columns)} |")
-        print("|:--|" + "--:|" * (len(columns) - 1))
+        for record in records:
+            self.append(record)
 
     def append(self, record: Any) -> None:
-        print(f"| {' | '.join(texts(self._columns, record))} |", flush=True)
+        if not self:
+            print(f"\n| {' | '.join(head for head, _, _ in self._columns)} |")
+            print("|:--|" + "--:|" * (len(self._columns) - 1))
+        values = [(value_of(record, path), text) for _, path, text in self._columns]
+        print(f"| {' | '.join('–' if of is None else text(of) for of, text in values)} |", flush=True)
         super().append(record)
-
-
-def print_table(columns: Sequence[Column], records: Sequence[Any]) -> None:
-    """A whole table; nothing where there are no records."""
-    table = Table(columns) if records else []
-    for record in records:
-        table.append(record)

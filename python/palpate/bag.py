@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy
 
-from ._bag import read_frames, topics
+from ._bag import read_bag, topics
 from ._bag_fields import _at, _flat
 from ._bag_messages import _PRESSURES
 from ._bag_transforms import stamp_s as stamp_s
 from ._error import Error
-from .recognition import warn
 
 
 def readings(message: Any, msgtype: str, field: str = "") -> list[float]:
@@ -85,9 +84,12 @@ def _in_flags(message: str, parser: argparse.ArgumentParser) -> str:
         name, flag = action.dest, action.option_strings[-1]
         # Some keywords are words of their own, too.
         ends = r"\b=?" if "_" in name or name == "tf" else r"(?:=|(?=:))"
-        message = re.sub(rf"(?<![\w/:-]){name}=(?=[\w('])", flag + " ", message)
+        message = re.sub(rf"(?<![\w/:-]){name}=(?:'([^']*)'|(?=[\w(]))", rf"{flag} \1", message)
         message = re.sub(rf"(?<![\w/:-]){name}{ends}", flag, message)
     return message
+
+
+_CLEAR = "\r" + " " * 16 + "\r"  #: the line of progress
 
 
 def _show_progress(fraction: float) -> None:
@@ -108,16 +110,6 @@ def _run(arguments: argparse.Namespace) -> None:
     folder = os.path.dirname(arguments.output) or "."
     if os.path.isdir(arguments.output) or not os.access(folder, os.W_OK):
         raise Error(f"-o {arguments.output}: cannot be written; give a file in a folder that exists")
-    for flag, number, unset, form in (
-        ("dead", int, "", "numbers of elements, such as 13,42"),
-        ("plane", float, "auto", "auto, or a normal such as 0,0,1"),
-        ("mount", float, None, "X,Y,Z,ROLL,PITCH,YAW, mm and degrees"),
-    ):
-        text = getattr(arguments, flag)
-        try:
-            _ = [number(part) for part in text.split(",")] if text != unset else []
-        except ValueError:
-            raise Error(f"--{flag} {text}: give {form}") from None
     shown = sys.stderr.isatty()
     options = vars(arguments) | {
         "pressure_topic": arguments.pressure_topic.split(","),
@@ -127,11 +119,10 @@ def _run(arguments: argparse.Namespace) -> None:
     }
     output = options.pop("output")
     del options["list"]
-    recording, remarks = read_frames(**options)
+    recording = read_bag(**options)
     if shown:
-        print("\r" + " " * 16 + "\r", end="", file=sys.stderr)
+        print(_CLEAR, end="", file=sys.stderr)
     recording.save(output)
-    warn(remarks)
     posed = f"{int(numpy.isfinite(recording.T_robot_sensor[:, 0]).sum())} with a pose"
     if arguments.tf is None and arguments.pose_topic is None:
         posed = "none with a pose, as neither --tf nor --pose-topic is given"
@@ -144,7 +135,8 @@ def main() -> int:
     parser = _flag_parser()
 
     def say(message: object) -> None:
-        print(f"palpate.bag: {_in_flags(str(message), parser)}", file=sys.stderr)
+        clear = _CLEAR if sys.stderr.isatty() else ""
+        print(f"{clear}palpate.bag: {_in_flags(str(message), parser)}", file=sys.stderr)
 
     warnings.showwarning = lambda message, *_: say(message)
     try:

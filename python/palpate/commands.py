@@ -20,17 +20,19 @@ from .recognition import (
     _Pair,
     _Path,
     _Recordings,
-    filled,
     import_request,
     recognition_request,
     request_of,
+    requests_of,
     warn,
+    without,
 )
 from .results import Evaluation, Plan, SensorCalibration, SetupCheck
 
 # The build writes the stubs by importing the package, where there is no NumPy.
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    import numpy
+    from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Unpack
 
 
@@ -103,17 +105,11 @@ def calibrate(
 
     Raises Error in the words of the command. What could not be learned is in the result's `warnings`.
     """
-    given = locals()
+    options = without(locals(), "recordings", "maps", "progress")
     if isinstance(bins, str):
         raise TypeError(f"bins: {bins!r}; give counts, such as (25, 25, 16), or leave it out")
-    learned = ("unposed", "layer", "levels", "max_maps", "group")
-    asked = [name for name in given if name not in ("recordings", "maps", "progress", *learned)]
-    fields, sensor = _palpate.calibrate(
-        recordings,
-        request_of({name: given[name] for name in asked}, maps),
-        filled(_palpate.CalibrationRequest(), calibrate, {name: given[name] for name in learned}),
-        progress,
-    )
+    request, own = requests_of(_palpate.CalibrationRequest(), calibrate, options, maps)
+    fields, sensor = _palpate.calibrate(recordings, request, own, progress)
     return SensorCalibration(fields, sensor)
 
 
@@ -168,26 +164,19 @@ def learn_maps(
     Raises Error in the words of the command. What the command would say on standard error becomes a
     UserWarning.
     """
-    given = locals()
-    shared = ("threshold", "ratio", "sensor_model", "touch_sd_mm", "touch_sd_deg", "frames", "device")
-    own = ("cell_mm", "spread_mm", "peak", "mirror", "label", "group", "unposed", "max_maps")
-    options = {name: given[name] for name in own}
+    options = without(locals(), "recordings", "folder", "progress")
     if folder is not None:
         options["output"] = os.path.join(os.fsdecode(folder), "")
     if prior is not None:
         options["prior"] = str(prior)
-    if origin is not None:
-        options["origin"] = origin if isinstance(origin, str) else ",".join(map(str, origin))
+    if origin is not None and not isinstance(origin, str):
+        options["origin"] = ",".join(map(str, origin))
     if isinstance(symmetry, Mapping):
         options["symmetry"] = ",".join(f"{name}={n}" for name, n in symmetry.items())
     elif symmetry is not None:
         options["symmetry"] = str(symmetry)
-    maps, sensor, words, sentences = _palpate.learn_maps(
-        recordings,
-        request_of({name: given[name] for name in shared}),
-        filled(_palpate.MapRequest(), learn_maps, options),
-        progress,
-    )
+    request, own = requests_of(_palpate.MapRequest(), learn_maps, options)
+    maps, sensor, words, sentences = _palpate.learn_maps(recordings, request, own, progress)
     warn(sentences)
     return LearnedMaps(maps, sensor, words)
 
@@ -201,7 +190,6 @@ def check_setup(
     spread_mm: float | None = None,
     device: Device | str | int | None = None,
     progress: Callable[[float], object] | None = None,
-    **former: object,
 ) -> SetupCheck:
     """Asks touches which set-up explains them best, as `palpate check` does.
 
@@ -214,13 +202,8 @@ def check_setup(
 
     Raises Error where an object has fewer than four touches in contact, or the arrays differ.
     """
-    for name in former:
-        instead = "; give spread_mm, half of it" if name == "psf_mm" else ""
-        raise TypeError(f"check_setup() got an unexpected keyword argument '{name}'{instead}")
-    given = {"threshold": threshold, "ratio": ratio, "device": device}
-    return SetupCheck(
-        _palpate.check_setup(recordings, request_of(given, ()), cell_mm, spread_mm, progress)
-    )
+    request = request_of({"threshold": threshold, "ratio": ratio, "device": device})
+    return SetupCheck(_palpate.check_setup(recordings, request, cell_mm, spread_mm, progress))
 
 
 def evaluate(
@@ -239,13 +222,10 @@ def evaluate(
     """
     if isinstance(results, (Mapping, Recognized, str, bytes, os.PathLike)):
         results = [results]
-    paths: list[str] = []
-    records: list[Any] = []
-    for item in results:
-        if isinstance(item, (str, bytes, os.PathLike)):
-            paths.append(os.fsdecode(item))
-        else:
-            records.append(item.record if isinstance(item, Recognized) else item)
+    items: list[Any] = list(results)
+    paths = [os.fsdecode(item) for item in items if isinstance(item, (str, bytes, os.PathLike))]
+    records = [item.record if isinstance(item, Recognized) else item
+               for item in items if not isinstance(item, (str, bytes, os.PathLike))]  # fmt: skip
     # As in the command's JSON, numbers that are not finite are null, and names need not be UTF-8.
     finite = json.loads(json.dumps(records), parse_constant=lambda _: None)
     text = json.dumps(finite, ensure_ascii=False).encode(errors="replace")
@@ -305,46 +285,38 @@ def import_tables(
     between two poses, columns of poses that were left out, units that nothing gives, and clocks that
     differ become a UserWarning.
     """
-    options = dict(locals())
-    for name in ("truth", "time_s", "pose_time_s"):
-        del options[name]
+    options = without(locals(), "truth", "time_s", "pose_time_s")
     options["where"] = [f"{name}={value}" for name, value in (where or {}).items()]
     if isinstance(pressures, (str, bytes, os.PathLike)):
         if time_s is not None or pose_time_s is not None:
             raise Error("time_s and pose_time_s: are for arrays; a table has a column of times")
-        recording, sentences = _palpate.import_tables(*import_request(import_tables, options))
+        recording, sentences = _palpate.import_tables(import_request(import_tables, options))
     elif isinstance(poses, (str, bytes, os.PathLike)):
         raise Error(f"poses: {os.fsdecode(poses)!r} is a file beside an array of pressures; give an array")
     else:
         options |= {"pressures": "pressures", "poses": None if poses is None else "poses"}
-        request, elements_mm = import_request(import_tables, options)
-        recording, sentences = _imported_arrays(request, elements_mm, pressures, time_s, poses, pose_time_s)
+        import numpy
+
+        readings = numpy.asarray(pressures, numpy.float64)
+        recording, sentences = _palpate.import_frames(
+            import_request(import_tables, options),
+            readings.reshape(len(readings), -1) if readings.ndim == 3 else readings,
+            time_s,
+            () if pose_time_s is None else pose_time_s,
+            None if poses is None else _in_space(poses),
+        )
     recording.truth = truth
     warn(sentences)
     return recording
 
 
-def _imported_arrays(
-    request: "_palpate.ImportOptions",
-    elements_mm: "ArrayLike | None",
-    pressures: "ArrayLike",
-    time_s: "ArrayLike | None",
-    poses: "ArrayLike | None",
-    pose_time_s: "ArrayLike | None",
-) -> tuple[Recording, list[str]]:
+def _in_space(poses: "ArrayLike") -> "NDArray[numpy.float64]":
+    """Poses [m, 3] of the plane as [m, 7]; others as they are."""
     import numpy
 
-    readings = numpy.asarray(pressures, numpy.float64)
-    rows = None if poses is None else numpy.asarray(poses, numpy.float64)
-    if rows is not None and rows.ndim == 2 and rows.shape[1] == 3:  # in the plane
-        half = 0.5 * rows[:, 2:]
-        zero = 0.0 * half
-        rows = numpy.hstack([rows[:, :2], zero, zero, zero, numpy.sin(half), numpy.cos(half)])
-    return _palpate.import_frames(
-        request,
-        readings.reshape(len(readings), -1) if readings.ndim == 3 else readings,
-        time_s,
-        () if pose_time_s is None else pose_time_s,
-        elements_mm,
-        rows,
-    )
+    rows = numpy.asarray(poses, numpy.float64)
+    if rows.ndim != 2 or rows.shape[1] != 3:
+        return rows
+    half = 0.5 * rows[:, 2:]
+    zero = 0.0 * half
+    return numpy.hstack([rows[:, :2], zero, zero, zero, numpy.sin(half), numpy.cos(half)])

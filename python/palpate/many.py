@@ -233,9 +233,7 @@ def _there(
 
 
 def _results(chunks: Sequence[list[_Entry]], done: _Done) -> Generator[Recognized, None, None]:
-    first = [0]
-    for chunk in chunks:
-        first.append(first[-1] + sum(count for _, count in chunk))
+    first = [0, *itertools.accumulate(sum(count for _, count in chunk) for chunk in chunks)]
     warned = False
     with closing(done):
         for index, (lines, sentence, device, host) in done:
@@ -309,22 +307,20 @@ def _index_of(
     return None if name.isdecimal() or len(alike) < 2 else alike[place_on_host() % len(alike)]
 
 
-def _place_on_host() -> int:
-    """The least number from 0 that no other process of this user has taken here on this computer.
+def _place_on_host(number: int = 0) -> int:
+    """The least number from this one on that no other process of this user has taken on this computer.
 
     It is held by a name of the kernel's (an abstract Unix socket) that ends with the process, however
     it ends: the worker that takes the place of a dead one takes its number, too.
     """
     global _place
-    for number in itertools.count():
-        place = socket.socket(socket.AF_UNIX)
-        try:
-            place.bind(f"\0palpate.{os.getuid()}.{number}")
-        except OSError as error:
-            place.close()
-            if error.errno != errno.EADDRINUSE:
-                raise
-        else:
-            _place = place
-            return number
-    raise AssertionError("numbers do not end")
+    place = socket.socket(socket.AF_UNIX)
+    try:
+        place.bind(f"\0palpate.{os.getuid()}.{number}")
+    except OSError as error:
+        place.close()
+        if error.errno != errno.EADDRINUSE:
+            raise
+        return _place_on_host(number + 1)
+    _place = place
+    return number

@@ -2,6 +2,7 @@
 `palpate[plot]` installs."""
 
 import io
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy
@@ -14,10 +15,8 @@ from .results import Evaluation, Record, Scores
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_Shown = OccupancyGrid | Marginals | Recording | Record | Evaluation | Scores | LearnedSensor
 
-
-def plot(shown: _Shown, ax: "Axes | None" = None) -> "Axes":
+def plot(shown: object, ax: "Axes | None" = None) -> "Axes":
     """Draws a map, a belief over position, touches or a recognised pose, in mm, or what was evaluated or
     learned; returns the axes."""
     if ax is None:
@@ -30,7 +29,7 @@ def plot(shown: _Shown, ax: "Axes | None" = None) -> "Axes":
     return ax
 
 
-def png(shown: _Shown) -> bytes | None:
+def png(shown: object) -> bytes | None:
     """The picture that a notebook shows; None without Matplotlib, so that it shows the text."""
     try:
         from matplotlib.figure import Figure
@@ -43,25 +42,13 @@ def png(shown: _Shown) -> bytes | None:
     return picture.getvalue()
 
 
-def _draw(shown: _Shown, ax: "Axes") -> None:
-    if isinstance(shown, Evaluation):
-        return _draw_confusion(shown, ax)
-    if isinstance(shown, Scores):
-        return _draw_reliability(shown, ax)
-    if isinstance(shown, LearnedSensor):
-        return _draw_readings(shown, ax)
-    if isinstance(shown, OccupancyGrid):
-        _draw_map(shown, ax)
-    elif isinstance(shown, Recording):
-        _draw_touches(shown, ax)
-    elif isinstance(shown, Record):
-        _draw_record(shown, ax)
-    else:
-        _draw_belief(shown, ax)
-    ax.set_aspect("equal")
-    ax.set_xlabel("x, mm")
-    ax.set_ylabel("y, mm")
-    return None
+def _draw(shown: object, ax: "Axes") -> None:
+    draw, in_mm = next(row for kind, row in _DRAWN.items() if isinstance(shown, kind))
+    draw(shown, ax)
+    if in_mm:
+        ax.set_aspect("equal")
+        ax.set_xlabel("x, mm")
+        ax.set_ylabel("y, mm")
 
 
 def _draw_confusion(evaluation: Evaluation, ax: "Axes") -> None:
@@ -150,8 +137,7 @@ def _draw_record(record: Record, ax: "Axes") -> None:
     if refined:
         # The covariance of T_object_robot, carried over to the place of the inverse.
         c, s = numpy.cos(refined["theta_rad"]), numpy.sin(refined["theta_rad"])
-        t_x, t_y = -c * refined["x_mm"] - s * refined["y_mm"], s * refined["x_mm"] - c * refined["y_mm"]
-        slope = numpy.array([[-c, -s, t_y], [s, -c, -t_x]])
+        slope = numpy.array([[-c, -s, y], [s, -c, -x]])
         covariance = slope @ numpy.array(refined["covariance"]) @ slope.T
         widths, axes = numpy.linalg.eigh(covariance)
         turn = numpy.linspace(0, 2 * numpy.pi, 100)
@@ -171,3 +157,15 @@ def _draw_record(record: Record, ax: "Axes") -> None:
         ax.plot((x, end[0]), (y, end[1]), color="black")
         ax.annotate(name, end, xytext=(3, 3), textcoords="offset points")
     ax.set_title(f"{record['best']}, {100 * record['identity'][record['best']]:.1f} %")
+
+
+#: What draws an object of each class, and whether in the plane, in mm.
+_DRAWN: dict[type[object], tuple[Callable[..., None], bool]] = {
+    OccupancyGrid: (_draw_map, True),
+    Marginals: (_draw_belief, True),
+    Recording: (_draw_touches, True),
+    Record: (_draw_record, True),
+    Evaluation: (_draw_confusion, False),
+    Scores: (_draw_reliability, False),
+    LearnedSensor: (_draw_readings, False),
+}

@@ -81,14 +81,17 @@ def recognize(
     would say on standard error becomes a UserWarning; what looks wrong with the touches is in the
     records' `warnings`.
     """
-    own = {name: value for name, value in locals().items() if name in recognize.__annotations__}
-    for name in ("recordings", "maps", "progress", "options"):
-        del own[name]
+    own = without(locals(), "recordings", "maps", "progress", "options")
     records, sentences = _palpate.recognize(
         recordings, recognition_request("recognize", options, maps, **own), progress
     )
     warn(sentences)
     return [Record(record) for record in records]
+
+
+def without(given: Mapping[str, Any], *names: str) -> dict[str, Any]:
+    """The arguments that a function was given, but for these."""
+    return {name: value for name, value in given.items() if name not in names}
 
 
 def recognition_request(
@@ -108,6 +111,14 @@ def request_of(options: Mapping[str, object], maps: object = ()) -> _palpate.Req
     return filled(_palpate.Request(maps), recognize, options)
 
 
+def requests_of(
+    own: _Request, function: Callable[..., Any], options: Mapping[str, Any], maps: object = ()
+) -> tuple[_palpate.Request, _Request]:
+    """The options of a function as a request of recognize()'s, and as one of its own, which has its others."""
+    mine = {name: value for name, value in options.items() if hasattr(own, name)}
+    return request_of(without(options, *mine), maps), filled(own, function, mine)
+
+
 def filled(request: _Request, function: Callable[..., Any], options: Mapping[str, Any]) -> _Request:
     """The request with the options of a function; None leaves the default."""
     for name, value in options.items():
@@ -124,18 +135,20 @@ def filled(request: _Request, function: Callable[..., Any], options: Mapping[str
 
 def import_request(
     function: Callable[..., Any], options: Mapping[str, Any]
-) -> tuple[_palpate.ImportOptions, Any]:
-    """What an import is asked, and the elements' centres where `array` gives these."""
+) -> _palpate.ImportOptions:
+    """What an import is asked; an array that is no text, path or grid is the elements' centres."""
     texts = dict(options)
-    array, texts["array"] = options["array"], None
+    array = texts.pop("array")
     if isinstance(array, tuple) and len(array) == 3 and isinstance(array[0], int):
-        texts["array"], array = ":".join(map(str, array)), None
+        texts["array"] = ":".join(map(str, array))
     elif isinstance(array, (str, bytes, os.PathLike)):
-        texts["array"], array = array, None
+        texts["array"] = array
+    else:
+        texts["elements_mm"] = array
     for name in ("dead", "plane", "mount", "pose_unit", "pose_columns", "pressure_columns"):
         if isinstance(given := texts.get(name), Iterable) and not isinstance(given, str):
             texts[name] = ",".join(map(str, given))
-    return filled(_palpate.ImportOptions(), function, texts), array
+    return filled(_palpate.ImportOptions(), function, texts)
 
 
 def warn(sentences: list[str]) -> None:

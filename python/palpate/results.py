@@ -24,6 +24,16 @@ def text_of(shown: object) -> str:
     return f"{type(shown).__name__}({', '.join(f'{name}={text(getattr(shown, name))}' for name in names)})"
 
 
+class Drawn:
+    """What is drawn with Matplotlib."""
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draws what the class says. Returns the axes."""
+        from .plots import plot
+
+        return plot(self, ax)
+
+
 class Fields(dict[str, Any]):
     """A JSON object whose keys are attributes, too; lists of numbers are arrays as attributes."""
 
@@ -50,7 +60,7 @@ class Fields(dict[str, Any]):
         return sorted({*super().__dir__(), *(key for key in self if key.isidentifier())})
 
 
-class Record(Fields):
+class Record(Fields, Drawn):
     """What was recognised, as a record in the JSON of `palpate recognize`.
 
     Keys are attributes, too: record["refined"]["sd"] is a list, record.refined.sd an array.
@@ -62,13 +72,10 @@ class Record(Fields):
     `T_robot_object` [x_mm, y_mm, theta_rad], `sd` and `covariance`, `fit` how well the touches fit
     it: {"z", "verdict"}. Of a recording that recognize_many() could not recognise there are only its
     name, `touches` (0), `truth` and `error`. docs/files.md lists all keys.
+
+    plot(ax=None) draws the object's frame and where x and y lie in 68 and 95 %, in the robot frame, in mm, with
+    Matplotlib, and returns the axes.
     """
-
-    def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draws the object's frame and where x and y lie in 68 and 95 %, in the robot frame, in mm."""
-        from .plots import plot
-
-        return plot(self, ax)
 
     def __repr__(self) -> str:
         if "error" in self:
@@ -82,22 +89,17 @@ class Record(Fields):
         )
 
 
-class Scores(Fields):
+class Scores(Fields, Drawn):
     """How right, and how honest, a set of records is: `records`, `right`, `accuracy` with its 95 %
     interval `accuracy_interval` [2] (Wilson), `log_loss` in nats, `calibration_error`, and `reliability`,
-    ten bins of confidence. docs/files.md explains them with the JSON of `palpate evaluate`."""
-
-    def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draws accuracy over confidence with Matplotlib. Returns the axes."""
-        from .plots import plot
-
-        return plot(self, ax)
+    ten bins of confidence. docs/files.md explains them with the JSON of `palpate evaluate`. plot(ax=None) draws
+    accuracy over confidence with Matplotlib, and returns the axes."""
 
     def __repr__(self) -> str:
         return f"Scores({self['right']} of {self['records']} right, log_loss {self['log_loss']:.3f} nats)"
 
 
-class Evaluation(Fields):
+class Evaluation(Fields, Drawn):
     """Records compared with the truth, as in the JSON of `palpate evaluate`.
 
     It has the fields of Scores, of all records; `known_classes`, Scores of the classes that maps have,
@@ -106,6 +108,9 @@ class Evaluation(Fields):
     often the class of a row was taken for the answer of a column; `error_mm` and `refined_error_mm`:
     {"records", "median"}; how many records were left out: `without_truth` and `failed`. The right answer
     of a class that no map has is "(none)". docs/files.md explains all keys.
+
+    plot(ax=None) draws with Matplotlib which classes are taken for which, and returns the axes; `all.plot()`
+    draws how far confidence can be trusted.
     """
 
     _kinds = {"known_classes": Scores}
@@ -114,13 +119,6 @@ class Evaluation(Fields):
     def all(self) -> Scores:
         """The scores of all records."""
         return Scores(self)
-
-    def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draws which classes are taken for which with Matplotlib; `all.plot()` draws how far confidence
-        can be trusted. Returns the axes."""
-        from .plots import plot
-
-        return plot(self, ax)
 
     def __repr__(self) -> str:
         return f"Evaluation({self['right']} of {self['records']} right, {len(self['classes'])} classes)"

@@ -9,6 +9,7 @@ import math
 import os
 import time
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy
@@ -18,17 +19,8 @@ from ._error import Error
 from ._palpate import Device, PoseLattice
 from ._program import begin, main, write
 from ._statistics import LEAST_GAIN, present
-from ._sweep_runs import Data, Document, Run, counts_of, lattices_of, measure
-from ._tables import (
-    Column,
-    Table,
-    column,
-    count_text,
-    mean_text,
-    number,
-    plain,
-    seconds_text,
-)
+from ._sweep_runs import Data, Document, Run, lattices_of, measure
+from ._tables import Column, Table, count_text, mean_text, number, plain, seconds_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,12 +51,8 @@ def sweep(
     improves (None where only the finest would do), and `advice`. Raises Error in the words of the
     command.
     """
-    data = Data(
-        [os.fspath(path) for path in recordings],
-        [os.fspath(path) for path in maps],
-        device or Device.open(),
-        options,
-    )
+    paths, map_paths = ([os.fspath(path) for path in given] for given in (recordings, maps))
+    data = Data(paths, map_paths, device or Device.open(), options)
     automatic = data.open(bins="auto", filter="auto").lattice
     batch = data.open(bins="fine", filter="auto")
     fine = batch.lattice
@@ -74,26 +62,23 @@ def sweep(
     lattices = lattices_of(fine, max_bins or (100_000 if quick else 10_000_000))
     dense = 1 if quick else 3
     finest = measure(data, lattices[-1], dense)
-    true_poses = sum(
-        record.get("truth", {}).get("T_robot_object") is not None for record in finest.records
-    )
+    true_poses = sum(record.get("truth", {}).get("T_robot_object") is not None for record in finest.records)
     table, runs = Table(_columns(true_poses > 0)), []
     for lattice in lattices:
-        run = finest if lattice is lattices[-1] else measure(data, lattice, dense)
-        run.compare_with(finest, data)
-        table.append(run.point)
-        runs.append(run)
+        runs.append(finest if lattice is lattices[-1] else measure(data, lattice, dense))
+        runs[-1].compare_with(finest, data)
+        table.append(runs[-1].point)
     mode, refined = (_first_that_suffices(runs, kind) for kind in ("mode", "refined"))
     return {
         "maps": len(data.maps),
         "recordings": len(finest.records),
         "true_poses": true_poses,
-        "points": [run.point for run in runs],
+        "points": table,
         "auto_count": automatic.bins,
         "fine_count": fine.bins,
         "mode_count": mode and mode.point["count"],
         "refined_count": refined and refined.point["count"],
-        "advice": _advice(mode, refined, runs[-1], data, automatic, fine),
+        "advice": _advice(mode, refined, finest, data, automatic, fine),
     }
 
 
@@ -101,13 +86,13 @@ def _columns(truth_known: bool) -> list[Column]:
     """Errors where the truth is known, else distances from the finest run."""
     mib, mm = number(".1f", 1.0 / (1 << 20)), number(".3f")
     errors: list[Column] = [
-        ("mode: mean error, mm", "error_mm", mean_text),
-        ("refined: mean error, mm", "refined_error_mm", mean_text),
+        ("mode: from the finest, mm", "from_finest_mm/mean", mm),
+        ("refined: from the finest, mm", "refined_from_finest_mm/mean", mm),
     ]
-    if not truth_known:
+    if truth_known:
         errors = [
-            ("mode: from the finest, mm", "from_finest_mm/mean", mm),
-            ("refined: from the finest, mm", "refined_from_finest_mm/mean", mm),
+            ("mode: mean error, mm", "error_mm", mean_text),
+            ("refined: mean error, mm", "refined_error_mm", mean_text),
         ]
     return [
         ("bins per object", "count", count_text),
@@ -157,51 +142,43 @@ def _first_that_suffices(runs: Sequence[Run], kind: str) -> Run | None:
 
 def _flags(lattice: PoseLattice, auto_pivot: bool) -> str:
     """The flags of `palpate recognize` that give the lattice."""
-
-    def range_of(flag: str, lower: float, upper: float) -> str:
-        return f" {flag}={lower:.6g}:{upper:.6g}"
-
     x, y, theta = lattice.x_mm, lattice.y_mm, lattice.theta_rad
-    text = f"--bins {plain(counts_of(lattice))}"
-    text += range_of("--x-mm", x.lower, x.upper) + range_of("--y-mm", y.lower, y.upper)
+    ranges = {"x-mm": (x.lower, x.upper), "y-mm": (y.lower, y.upper)}
     if theta.upper - theta.lower < 2.0 * math.pi - 1e-9:
-        text += range_of("--theta-deg", math.degrees(theta.lower), math.degrees(theta.upper))
+        ranges["theta-deg"] = (math.degrees(theta.lower), math.degrees(theta.upper))
+    flags = [f"--bins {plain(lattice.shape[::-1])}"]
+    flags += [f"--{name}={lower:.6g}:{upper:.6g}" for name, (lower, upper) in ranges.items()]
     if auto_pivot:
-        return text + " --pivot-mm auto"
-    pivot = lattice.pivot_mm
-    return text + (f" --pivot-mm={pivot[0]:.6g},{pivot[1]:.6g}" if pivot.any() else "")
+        flags.append("--pivot-mm auto")
+    elif lattice.pivot_mm.any():
+        flags.append("--pivot-mm={:.6g},{:.6g}".format(*lattice.pivot_mm))
+    return " ".join(flags)
 
 
 def _advice(
-    mode: Run | None,
-    refined: Run | None,
-    finest: Run,
-    data: Data,
-    automatic: PoseLattice,
-    fine: PoseLattice,
+    mode: Run | None, refined: Run | None, finest: Run, data: Data, automatic: PoseLattice, fine: PoseLattice
 ) -> str:
     advised = refined or finest
     count, flags = count_text(advised.point["count"]), _flags(advised.lattice, data.auto_pivot)
+    words = (
+        f"Poses move up to the finest bins, {count} per object ({flags}): give a larger --max-bins, or a "
+        "smaller region."
+    )
     if refined:
         needs = f"needs {count_text(mode.point['count'])}" if mode else "gains up to the finest bins"
         words = (
-            f"Beyond {count} bins per object ({flags}) neither recognition nor the refined pose "
-            f"improves; the mode {needs}."
-        )
-    else:
-        words = (
-            f"Poses move up to the finest bins, {count} per object ({flags}): give a larger "
-            "--max-bins, or a smaller region."
+            f"Beyond {count} bins per object ({flags}) neither recognition nor the refined pose improves; "
+            f"the mode {needs}."
         )
     costs = [
         f"{seconds_text(advised.point[name])} by {by}"
         for name, by in (("seconds_histogram", "the histogram"), ("seconds_bounds", "bounds"))
         if advised.point[name] is not None
     ]
+    auto_takes, fine_takes = (f"{plain(of.shape[::-1])} = {count_text(of.bins)}" for of in (automatic, fine))
     return (
-        f"{words}\nAn unknown then costs {' and '.join(costs)}. --bins auto takes "
-        f"{plain(counts_of(automatic))} = {count_text(automatic.bins)}, and --bins fine "
-        f"{plain(counts_of(fine))} = {count_text(fine.bins)}."
+        f"{words}\nAn unknown then costs {' and '.join(costs)}. --bins auto takes {auto_takes}, and "
+        f"--bins fine {fine_takes}."
     )
 
 
@@ -209,13 +186,10 @@ def _charts_of(document: Document) -> "dict[str, Figure]":
     """The charts of a sweep: error and time against bins."""
     from . import _charts as charts
 
-    points = document["points"]
-    truth_known = document["true_poses"] > 0
-    counts = column(points, "count")
+    points, truth_known = document["points"], document["true_poses"] > 0
     y = "mean pose error (mm)" if truth_known else "mean distance from the pose of the finest bins (mm)"
     errors, times = (
-        charts.chart("bins per object", of, xscale="log", yscale="log")
-        for of in (y, "time per unknown")
+        charts.chart("bins per object", of, xscale="log", yscale="log") for of in (y, "time per unknown")
     )
     charts.ticks(times.yaxis, seconds_text, (1.0, 2.0, 5.0))
     field = "error_mm" if truth_known else "from_finest_mm"
@@ -227,24 +201,24 @@ def _charts_of(document: Document) -> "dict[str, Figure]":
         (times, "seconds_histogram", "histogram", charts.SOLID),
         (times, "seconds_bounds", "by bounds", charts.DASHED),
     ):
-        axes.plot(counts, column(points, path), label=label, **look)
+        charts.series(axes, points, "count", path, label, **look)
     for name, label, colour in (
         ("auto_count", "--bins auto", charts.GREY),
         ("fine_count", "--bins fine", charts.GREY),
         ("refined_count", "enough", "black"),
     ):
         at = document[name]
-        if at is not None and counts[0] <= at <= counts[-1]:
+        if at is not None and points[0]["count"] <= at <= points[-1]["count"]:
             charts.rule(errors, at, label, vertical=True, colour=colour)
     for axes in (errors, times):
         charts.ticks(axes.xaxis, count_text)
     return dict(zip(CHARTS, map(charts.finished, (errors, times)), strict=True))
 
 
-def _pair(flag: str, text: str | None) -> tuple[float, float] | str | None:
+def _pair(flag: str, text: str) -> tuple[float, float] | str:
     """LOWER:UPPER, or X,Y or auto of a pivot. Raises Error."""
     pivot = flag == "--pivot-mm"
-    if text is None or (pivot and text == "auto"):
+    if pivot and text == "auto":
         return text
     try:
         first, second = map(float, text.split("," if pivot else ":"))
@@ -267,11 +241,14 @@ def _flag_parser() -> argparse.ArgumentParser:
         "the object or its pose, the sweep tells accuracy and errors")  # fmt: skip
     add("--scene", metavar="FILE", help="scene file (YAML), as of palpate recognize")
     add("--sensor-model", metavar="FILE", help="what palpate calibrate has learned")
-    add("--x-mm", metavar="LOWER:UPPER", help="range of x, as of palpate recognize [every place of an array that "
-        "touches an object of the maps]")  # fmt: skip
-    add("--y-mm", metavar="LOWER:UPPER", help="range of y")
-    add("--theta-deg", metavar="LOWER:UPPER", help="range of theta, degrees [0:360]")
-    add("--pivot-mm", metavar="X,Y|auto", help="point about which theta turns")
+    for flag, metavar, words in (
+        ("--x-mm", "LOWER:UPPER", "range of x, as of palpate recognize [every place of an array that touches "
+         "an object of the maps]"),
+        ("--y-mm", "LOWER:UPPER", "range of y"),
+        ("--theta-deg", "LOWER:UPPER", "range of theta, degrees [0:360]"),
+        ("--pivot-mm", "X,Y|auto", "point about which theta turns"),
+    ):  # fmt: skip
+        add(flag, metavar=metavar, type=partial(_pair, flag), help=words)
     add("--threshold", type=float, help="contact threshold, in the recordings' unit")
     add("--ratio", type=float, help="threshold as a fraction of the largest pressure")
     add("--max-bins", type=int, metavar="N",
@@ -287,10 +264,9 @@ def _run() -> None:
     arguments = _flag_parser().parse_args()
     if arguments.max_bins is not None and arguments.max_bins < 1_000:
         raise Error(f"--max-bins = {arguments.max_bins}: give 1000 or more")
-    given = vars(arguments)
-    options = {name: given[name] for name in ("scene", "sensor_model", "threshold", "ratio")}
-    for name in ("x_mm", "y_mm", "theta_deg", "pivot_mm"):
-        options[name] = _pair("--" + name.replace("_", "-"), given[name])
+    options = vars(arguments).copy()
+    for own in ("device", "json", "plots"):
+        del options[own]
     if arguments.plots:
         try:
             from ._charts import save
@@ -298,14 +274,7 @@ def _run() -> None:
             raise Error("--plots: Matplotlib is missing; pip install 'palpate[plot]'") from missing
     device, facts = begin(arguments, palpate=__version__)
     start = time.perf_counter()
-    document = facts | sweep(
-        arguments.recordings,
-        arguments.maps,
-        max_bins=arguments.max_bins,
-        quick=arguments.quick,
-        device=device,
-        **options,
-    )
+    document = facts | sweep(device=device, **options)
     document["seconds in all"] = round(time.perf_counter() - start, 1)
     print(f"\n{document['advice']}")
     if arguments.plots:

@@ -56,8 +56,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
     folder = tmp_path_factory.mktemp("capcontact")
     write_presses(folder / "presses.npz", people=4, each=6)
     presses = dict(numpy.load(folder / "presses.npz"))
-    held_out = presses["participant"] == 3
-    for name, kept in (("held_out.npz", held_out), ("presses.npz", ~held_out)):
+    for name, kept in (("held_out.npz", slice(18, None)), ("presses.npz", slice(18))):
         numpy.savez(folder / name, **{key: of[kept] for key, of in presses.items()})
     return folder
 

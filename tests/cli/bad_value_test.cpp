@@ -4,7 +4,7 @@
 #include <fmt/ranges.h>
 
 #include "cli/options.hpp"
-#include "learning/map_request.hpp"
+#include "learning/map_task.hpp"
 #include "letter_files.hpp"
 #include "options/option.hpp"
 #include "recognition_flags.hpp"

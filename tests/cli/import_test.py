@@ -276,13 +276,6 @@ class Import(ImportTest):
             places = [(-y, x) for x, y in self.table("array.csv")[1]]
             self.assertEqual([reading for _, reading in sorted(zip(places, row[1:]))], expected, flags)
 
-    def test_whole_numbers_that_may_be_pressures_are_not_noticed(self) -> None:
-        self.assertNotIn("whole numbers", self.said(), "of few kPa")
-        self.put({"log.csv": "time,p0,p1\n0,12,4095\n0.05,0.5,3\n"})
-        self.assertNotIn("whole numbers", self.said())
-        self.put({"log.csv": "time,p0,p1\n0,12,4095\n0.05,,3\n"})
-        self.assertNotIn("whole numbers", self.said("--pressure-unit raw"))
-
     def test_the_largest_gap_follows_the_poses(self) -> None:
         """Frames at 100 Hz and poses at 10 Hz, of which some are lost; the steps of the poses round to both sides
         of 0.1 s."""
@@ -297,21 +290,6 @@ class Import(ImportTest):
             rows = (f"{1.7e9 + i * 0.1},{i},0,0\n" for i in range(21) if not 8 <= i < 8 + lost)
             self.put({"poses.csv": "time,x_mm,y_mm,theta_rad\n" + "".join(rows)})
             self.assertIn(said, self.said(WITH_POSES + flags))
-
-    def test_refuses_what_does_not_go_together(self) -> None:
-        for files, flags, named in (
-            ({}, "--sign 2", "palpate: --sign 2: give 1, or -1 where readings fall under load\n"),
-            ({}, "--unposed --poses poses.csv", "--unposed: poses.csv holds the poses; leave one of them out\n"),
-            ({}, "--poses poses.csv --pose-delay nan", "--pose-delay nan"),
-            ({"poses.csv": "x,y,theta\n0,0,0\n0,0,0\n0,0,0\n"}, "--poses poses.csv --pose-delay 0.1",
-             "--pose-delay 0.1: poses.csv has no times"),
-            ({"poses.csv": CASES["frames_outside_the_poses_and_in_a_gap"].files["poses.csv"]},
-             "--poses poses.csv --largest-gap-s 0.03",
-             "poses.csv: no row of log.csv finds a pose: its times are 0 to 0.1 s, the poses' are 0.01 to 0.08 s; "
-             "check clocks and units, or raise --largest-gap-s"),
-        ):  # fmt: skip
-            self.put({"poses.csv": POSES, **files})
-            self.assert_refused(self.arguments(flags), named)
 
 
 class ClocksOfLogs(ImportTest):

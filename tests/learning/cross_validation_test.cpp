@@ -9,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "learning/held_out.hpp"
-#include "learning/temperature_fit.hpp"
 #include "model/random.hpp"
 #include "simulated_presses.hpp"
 

@@ -1,4 +1,4 @@
-#include "learning/temperature_fit.hpp"
+#include "learning/held_out.hpp"
 
 #include <algorithm>
 #include <array>
@@ -167,18 +167,6 @@ TEST(TemperatureFit, DoesNotGrowWhereTouchesAreIndependentOrAllToldApart) {
   wrong[3].truth = 1;
   EXPECT_EQ(growth(wrong, right), 0.0);
   EXPECT_GT(growth(wrong, wrong), 5.0) << "both halves show it";
-}
-
-TEST(ScoresOfPresses, CountsByHand) {
-  const double sure = std::log(0.85 / 0.15);
-  std::vector<HeldOut> presses(3, {.truth = 0, .log_evidence = {sure, 0.0}});
-  presses[2].truth = 1;
-  presses.push_back({.truth = 1, .log_evidence = {0.0, std::log(0.65 / 0.35)}});
-  const Scores found = scores_of(presses, 1.0);
-  EXPECT_DOUBLE_EQ(found.accuracy(), 0.75);
-  EXPECT_NEAR(found.log_loss, -(2.0 * std::log(0.85) + std::log(0.15) + std::log(0.65)) / 4.0,
-              1e-12);
-  EXPECT_NEAR(found.calibration_error, 0.75 * (0.85 - 2.0 / 3.0) + 0.25 * 0.35, 1e-12);
 }
 
 TEST(TemperedByFolds, GivesEachFoldTheTemperatureOfTheOthers) {

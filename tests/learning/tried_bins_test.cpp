@@ -1,4 +1,4 @@
-#include "learning/tried_bins.hpp"
+#include "learning/cross_validation.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -9,18 +9,10 @@
 
 #include "palpate/simulation.hpp"
 #include "support/errors.hpp"
+#include "support/sample_files.hpp"
 #include "support/synthetic.hpp"
 
 namespace palpate::unposed_maps_test {
-
-/// Presses of an array of 16 x 16 elements, 2 mm apart, that sees a letter whole.
-Recording presses_of(const std::string& shape, int presses, std::uint64_t seed) {
-  std::vector<Pose> T_object_sensor = random_poses(presses, seed);
-  for (Pose& pose : T_object_sensor) {
-    pose.translation_mm *= 0.3;  // within 3 mm of the letter's middle
-  }
-  return Simulator(make_shape(shape), {}, grid_array(16, 16, 2.0), seed).touch(T_object_sensor, {});
-}
 
 UnposedOptions usual_options(std::size_t most_maps) {
   UnposedOptions options;
@@ -62,7 +54,7 @@ std::vector<std::size_t> presses_in(const UnposedMap& map) {
 
 TEST(UnposedMaps, PressesOfALetterFuseIntoItsShapeWhateverPosesTheySay) {
   for (const std::string letter : {"A", "U", "E"}) {
-    const Recording recording = presses_of(letter, 10, 3);
+    const Recording recording = sample_presses(letter, 10, 3);
     const UnposedMaps result = unposed_maps(all_touches(recording), letter, usual_options(1));
     ASSERT_EQ(result.maps.size(), 1u);
     EXPECT_TRUE(result.misfits.empty()) << letter;
@@ -72,7 +64,7 @@ TEST(UnposedMaps, PressesOfALetterFuseIntoItsShapeWhateverPosesTheySay) {
     // Measured: 0.68 for the U, above 0.7 for the others.
     EXPECT_GT(overlap(result.maps[0], recording, make_shape(letter)), 0.6) << letter;
   }
-  Recording a = presses_of("A", 5, 13);
+  Recording a = sample_presses("A", 5, 13);
   const OccupancyGrid before = unposed_maps(all_touches(a), "A", usual_options(1)).maps[0].map;
   std::ranges::fill(a.T_robot_sensor, Pose{{1000.0, -7.0}, 1.0});
   EXPECT_EQ(unposed_maps(all_touches(a), "A", usual_options(1)).maps[0].map.log_odds,
@@ -80,7 +72,7 @@ TEST(UnposedMaps, PressesOfALetterFuseIntoItsShapeWhateverPosesTheySay) {
 }
 
 TEST(UnposedMaps, PressesThatFitAtEveryAngleCountLess) {
-  const Recording recording = presses_of("ring", 6, 8);
+  const Recording recording = sample_presses("ring", 6, 8);
   const UnposedMaps result = unposed_maps(all_touches(recording), "ring", usual_options(1));
   for (const PlacedPress& press : result.maps.at(0).presses) {
     EXPECT_LT(press.weight, 0.4);
@@ -90,7 +82,7 @@ TEST(UnposedMaps, PressesThatFitAtEveryAngleCountLess) {
 
 TEST(UnposedMaps, MirroredPressesJoinWhereTheObjectMayLieOnItsOtherSide) {
   // A J is far from its mirror image at every turn, as blurred as the array sees it.
-  Recording mixed = presses_of("J", 8, 12);
+  Recording mixed = sample_presses("J", 8, 12);
   constexpr std::ptrdiff_t side = 16;
   for (auto row = mixed.pressure.begin() + 4 * side * side; row != mixed.pressure.end();
        row += side) {
@@ -117,8 +109,8 @@ TEST(UnposedMaps, MirroredPressesJoinWhereTheObjectMayLieOnItsOtherSide) {
 }
 
 TEST(UnposedMaps, TakesLearnedTablesOverTheirLayer) {
-  const Recording a = presses_of("A", 6, 14);
-  const Recording o = presses_of("ring", 1, 15);
+  const Recording a = sample_presses("A", 6, 14);
+  const Recording o = sample_presses("ring", 1, 15);
   std::vector<Touch> presses = all_touches(a);
   presses.push_back(o.touch(0));
   UnposedOptions options = usual_options(1);
@@ -142,7 +134,7 @@ TEST(UnposedMaps, TakesLearnedTablesOverTheirLayer) {
 }
 
 TEST(UnposedMaps, RefusesWhatCannotBePlaced) {
-  const Recording a = presses_of("A", 2, 16);
+  const Recording a = sample_presses("A", 2, 16);
   Recording nothing = a;
   std::ranges::fill(nothing.pressure, 0.0);
   const std::vector<glm::dvec2> element{{0.0, 0.0}};

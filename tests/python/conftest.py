@@ -20,16 +20,30 @@ def device() -> palpate.Device:
     return palpate.Device.open(os.environ.get("PALPATE_DEVICE", "llvmpipe"))
 
 
+Maps = list[palpate.OccupancyGrid]
+
+
+def built(device: palpate.Device, touches: palpate.Recording, **options: Any) -> palpate.OccupancyGrid:
+    """The map of touches of one object."""
+    builder = palpate.MapBuilder(device, **options)
+    builder.add(touches)
+    return builder.build(touches.object)
+
+
 def learned(device: palpate.Device, letter: str) -> palpate.OccupancyGrid:
     """The map of a letter, from touches of seed 1."""
-    builder = palpate.MapBuilder(device)
-    builder.add(palpate.simulate(letter, seed=1))
-    return builder.build(letter)
+    return built(device, palpate.simulate(letter, seed=1))
 
 
 @pytest.fixture(scope="session")
-def maps(device: palpate.Device) -> list[palpate.OccupancyGrid]:
+def maps(device: palpate.Device) -> Maps:
     return [learned(device, letter) for letter in "AEI"]
+
+
+@pytest.fixture
+def belief(device: palpate.Device, maps: Maps) -> palpate.PoseHistogram:
+    """Of A, E and I, before any touch."""
+    return palpate.PoseHistogram(device, maps)
 
 
 @pytest.fixture(scope="session")
@@ -43,10 +57,23 @@ def unknown() -> palpate.Recording:
     )
 
 
+@pytest.fixture
+def posterior(belief: palpate.PoseHistogram, unknown: palpate.Recording) -> palpate.PoseHistogram:
+    """The belief after the nine touches."""
+    belief.update(unknown)
+    return belief
+
+
 def run(*arguments: object, cwd: pathlib.Path | None = None) -> "subprocess.CompletedProcess[str]":
     """Runs the command `palpate` to its end, whatever comes of it."""
     line = [os.environ["PALPATE_COMMAND"], *map(str, arguments)]
     return subprocess.run(line, cwd=cwd, capture_output=True, text=True, timeout=300)
+
+
+def python(script: str, *arguments: str, **environment: str) -> "subprocess.CompletedProcess[str]":
+    """Runs a script in an interpreter of its own."""
+    line, env = [sys.executable, "-c", script, *arguments], {**os.environ, **environment}
+    return subprocess.run(line, capture_output=True, text=True, timeout=120, env=env)
 
 
 def command(*arguments: object, cwd: pathlib.Path | None = None) -> str:
@@ -79,9 +106,7 @@ def warned(call: Callable[..., Any], *arguments: object, **named: object) -> tup
     return value, " ".join(str(warning.message) for warning in said)
 
 
-def expect_refused(
-    call: Callable[[], object], *arguments: object, spelled: Mapping[str, str] = {}
-) -> None:
+def expect_refused(call: Callable[[], object], *arguments: object, spelled: Mapping[str, str] = {}) -> None:
     """The call is refused as the command with the arguments is, but for how each spells options.
     `spelled` has how Python spells each option that the command's words name."""
     words, said = refusal(*arguments), error_of(call)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy
 import pytest
-from conftest import error_of
+from conftest import Maps, error_of
 
 import palpate
 
@@ -60,10 +60,8 @@ def test_arrays_that_were_checked_stay() -> None:
     ],
 )
 def test_arrays_that_are_changed_in_place_are_refused_at_use(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid], reshaped: str, shape: tuple[int, ...],
-    named: str,
-) -> None:  # fmt: skip
-    belief = palpate.PoseHistogram(device, maps)
+    belief: palpate.PoseHistogram, maps: Maps, reshaped: str, shape: tuple[int, ...], named: str
+) -> None:
     recording = palpate.Recording(**arrays(), valid=numpy.ones((4, 6), bool))
     getattr(recording, reshaped).shape = shape
     for use in (belief.update, lambda given: given.save("none.h5"),
@@ -71,10 +69,7 @@ def test_arrays_that_are_changed_in_place_are_refused_at_use(
         assert error_of(use, recording) == f"{named}: was given another shape; make another Recording"
 
 
-def test_a_touch_that_is_changed_in_place_is_refused_at_use(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid]
-) -> None:
-    belief = palpate.PoseHistogram(device, maps)
+def test_a_touch_that_is_changed_in_place_is_refused_at_use(belief: palpate.PoseHistogram) -> None:
     touch = palpate.Touch((0, 0, 0), GRID, numpy.zeros(6))
     touch.pressure.shape = (2, 3)
     assert error_of(belief.update, [touch]) == "pressure: was given another shape; make another Touch"
@@ -124,16 +119,13 @@ def test_a_touch_reads_other_layouts_as_copies_and_flags_in_place() -> None:
     assert counts.valid is not None and counts.valid.tolist() == [0, 1, 1] * 2
 
 
-def test_read_only_arrays_are_read(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
-) -> None:
+def test_read_only_arrays_are_read(belief: palpate.PoseHistogram, unknown: palpate.Recording) -> None:
     pressure = unknown.pressure.copy()
     pressure.flags.writeable = False
     frozen = palpate.Recording(pressure, unknown.T_robot_sensor, unknown.elements_mm)
     assert address(frozen.pressure) == address(pressure)
     with pytest.raises(ValueError):
         frozen.pressure[0, 0] = 1.0
-    belief = palpate.PoseHistogram(device, maps)
     belief.update(frozen)
     assert belief.estimate().identity.argmax() == 1
 
@@ -160,9 +152,7 @@ def test_what_does_not_fit_is_refused_by_name(changed: dict[str, object], messag
     assert error_of(palpate.Recording, **(arrays() | changed)) == message
 
 
-def test_masked_readings_are_unknown(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
-) -> None:
+def test_masked_readings_are_unknown(device: palpate.Device, maps: Maps, unknown: palpate.Recording) -> None:
     dead = numpy.zeros(unknown.pressure.shape, bool)
     dead[:, 3] = dead[2, 17] = True
     junk = numpy.where(dead, numpy.inf, unknown.pressure)
@@ -189,7 +179,7 @@ def test_masked_readings_are_unknown(
     assert numpy.array_equal(values[~dead[2]], unknown.pressure[2][~dead[2]])
 
 
-def test_only_readings_may_be_masked(maps: list[palpate.OccupancyGrid]) -> None:
+def test_only_readings_may_be_masked(maps: Maps) -> None:
     for name, value in {**arrays(), "valid": numpy.ones(6, int), "time_s": numpy.zeros(4),
                         "lost_before": numpy.zeros(4, int)}.items():  # fmt: skip
         masked = numpy.ma.masked_array(value, mask=False)
@@ -203,15 +193,11 @@ def test_only_readings_may_be_masked(maps: list[palpate.OccupancyGrid]) -> None:
     assert said.startswith("log_odds: has masked values")
 
 
-def test_results_are_views_that_keep_their_memory(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
-) -> None:
+def test_results_are_views_that_keep_their_memory(maps: Maps, posterior: palpate.PoseHistogram) -> None:
     assert address(maps[0].log_odds) == address(maps[0].log_odds)
     assert not maps[0].log_odds.flags.writeable
-    belief = palpate.PoseHistogram(device, maps)
-    belief.update(unknown)
-    identity = belief.estimate().identity  # of an Estimate that nothing else keeps
-    xy = belief.marginals(1).xy
+    identity = posterior.estimate().identity  # of an Estimate that nothing else keeps
+    xy = posterior.marginals(1).xy
     cells = palpate.OccupancyGrid("A", numpy.ones((3, 4)), cell_mm=1, origin_mm=(0, 0)).log_odds
     for _ in range(100):
         numpy.ones(3)
@@ -219,7 +205,7 @@ def test_results_are_views_that_keep_their_memory(
     assert (cells == 1).all()
     assert xy.shape == (25, 25)
     assert xy.sum() == pytest.approx(identity[1], abs=1e-6)
-    assert belief.log_likelihood(0).shape == belief.lattice.shape == (16, 25, 25)
+    assert posterior.log_likelihood(0).shape == posterior.lattice.shape == (16, 25, 25)
 
 
 def test_poses_compose() -> None:
@@ -231,8 +217,7 @@ def test_poses_compose() -> None:
     assert numpy.allclose(palpate.compose(T_a_c, palpate.inverse(T_a_c)), 0, atol=1e-12)
 
 
-def test_what_is_no_touch_is_refused(device: palpate.Device, maps: list[palpate.OccupancyGrid]) -> None:
-    belief = palpate.PoseHistogram(device, maps)
+def test_what_is_no_touch_is_refused(device: palpate.Device, belief: palpate.PoseHistogram) -> None:
     assert "touches: item 0 is a int; give a Touch" in error_of(belief.update, [3])
     said = error_of(palpate.PoseHistogram, device, ["A.map.h5"])
     assert "maps: item 0 is a str; give OccupancyGrid" in said

@@ -216,7 +216,7 @@ def test_only_wanted_transforms_are_kept(mcap: pathlib.Path) -> None:
         with _bag_messages.opened(str(mcap)) as bag:
             tree = bag.transforms([(target, source)])
             bag.read([tree], None)
-        return {name: len(edge.rows) // 7 for name, edge in tree.edges.items()}
+        return {name: len(edge.rows) for name, edge in tree.edges.items()}
 
     assert kept("base", "array") == {"array": 1, "arm": 11, "cup": 1}
     # What came before the chain was complete is forgotten, what came later not kept.
@@ -296,10 +296,9 @@ def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_pa
         ((tmp_path / "none.bag", "--list"), "none.bag: no such file"),
         ((mcap, *flags, "-o", tmp_path), ": cannot be written; give a file in a folder that exists"),
         ((mcap, *flags, "-o", tmp_path / "none" / "f.h5"), ": cannot be written; give a file"),
-        ((mcap, *flags, "--dead", "auto", "-o", file), "--dead auto: give numbers of elements, such"),
-        ((mcap, *flags, "--plane", "", "-o", file), "--plane : give auto, or a normal such as"),
-        ((mcap, *flags, "--mount", "auto", "-o", file), "--mount auto: give X,Y,Z,ROLL,PITCH,YAW, mm"),
-        ((mcap, *flags, "--mount", "", "-o", file), "--mount : give X,Y,Z,ROLL,PITCH,YAW, mm and degrees"),
+        ((mcap, *flags, "--dead", "auto", "-o", file), "--dead auto: 'auto' is no element"),
+        ((mcap, *flags, "--plane", "", "-o", file), "--plane: give auto, or "),
+        ((mcap, *flags, "--mount", "auto", "-o", file), "--mount auto: give X,Y,Z,ROLL,PITCH,YAW"),
         ((mcap, *flags, "--array", "2:3:2", "-o", file), "array of 6 elements; correct --array\n"),
         ((mcap, *flags, "--tf", "base:head", "-o", file), ": --tf base:head: no chain of transforms"),
         ((mcap, "--pressure-topic", "/hand", *flags[2:], "-o", file), "name one by --pressure-field\n"),

@@ -4,12 +4,10 @@ from typing import Any
 
 import numpy
 import pytest
-from conftest import error_of
+from conftest import Maps, built, error_of
 
 import palpate
 from palpate import reference
-
-Maps = list[palpate.OccupancyGrid]
 
 
 def test_a_pose_is_refined_near_the_mode_that_is_given(
@@ -46,9 +44,8 @@ def test_marginals_are_over_the_grid_that_is_given(
 
 
 def test_a_map_is_built_by_the_classifier_that_is_given(device: palpate.Device, maps: Maps) -> None:
-    builder = palpate.MapBuilder(device, classifier=palpate.ContactClassifier(threshold=8.0))
-    builder.add(palpate.simulate("E", seed=1))
-    assert (builder.build("E").log_odds > 0).sum() < (maps[1].log_odds > 0).sum()
+    by_strong = built(device, palpate.simulate("E", seed=1), classifier=palpate.ContactClassifier(threshold=8.0))
+    assert (by_strong.log_odds > 0).sum() < (maps[1].log_odds > 0).sum()
 
 
 def test_bins_and_seeds_are_the_ones_that_are_given() -> None:
@@ -74,12 +71,10 @@ def test_recordings_of_different_units_are_not_recognised_together(
 
 
 def test_likely_bins_and_modes_are_the_belief(
-    device: palpate.Device, maps: Maps, unknown: palpate.Recording
+    device: palpate.Device, maps: Maps, unknown: palpate.Recording, posterior: palpate.PoseHistogram
 ) -> None:
-    belief = palpate.PoseHistogram(device, maps)
-    belief.update(unknown)
-    bins, shares = belief.likely_bins(1, 1e-7)
-    logs = belief.log_likelihood(1).ravel()
+    bins, shares = posterior.likely_bins(1, 1e-7)
+    logs = posterior.log_likelihood(1).ravel()
     expected = numpy.exp(logs - logs.max())
     assert shares == pytest.approx(expected[bins] / expected.sum(), rel=1e-3)
     assert shares.sum() == pytest.approx(1.0, abs=1e-3)
@@ -129,9 +124,7 @@ def test_evaluated_bins_are_those_of_the_histogram_and_of_the_reference(
 
 def test_the_reference_has_the_map_of_the_builder(device: palpate.Device) -> None:
     touches = palpate.simulate("A", seed=1)[:20]
-    builder = palpate.MapBuilder(device)
-    builder.add(touches)
-    grid = builder.build("A")
+    grid = built(device, touches)
     expected = reference.log_odds_map(touches, grid)
     # The bound that MapBuilder states.
     assert numpy.all(abs(grid.log_odds - expected) <= numpy.maximum(1e-3, 1e-4 * abs(expected)))

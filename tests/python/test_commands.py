@@ -106,7 +106,6 @@ def test_arguments_of_another_type_are_refused(files: Files, presses: list[pathl
         (palpate.plan, [files.unknown], {"each_frame": True}, "unexpected keyword argument 'each_frame'"),
         (palpate.calibrate, [presses], {"bins": "auto"}, "bins: 'auto'; give counts"),
         (palpate.learn_maps, [presses], {"cell_mm": "wide"}, r"^cell_mm: 'wide'; give float \| None"),
-        (palpate.check_setup, [presses], {"psf_mm": 1.0}, "'psf_mm'; give spread_mm, half of it"),
         (palpate.import_tables, [files.folder / "p.csv"], {"array": (2, 2, 1), "rate": "fast"},
          "rate: 'fast'; give float"),
     ]  # fmt: skip

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy
 import pytest
-from conftest import error_of, learned
+from conftest import Maps, error_of, learned
 from numpy.typing import ArrayLike
 
 import palpate

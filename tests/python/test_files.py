@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import numpy
 import pytest
-from conftest import error_of
+from conftest import Maps, error_of
 
 import palpate
 
@@ -39,7 +39,7 @@ def test_a_recording_comes_back_as_it_was(tmp_path: pathlib.Path) -> None:
     assert back.path == str(tmp_path / "r.h5")
 
 
-def test_a_map_comes_back_as_it_was(tmp_path: pathlib.Path, maps: list[palpate.OccupancyGrid]) -> None:
+def test_a_map_comes_back_as_it_was(tmp_path: pathlib.Path, maps: Maps) -> None:
     cells = maps[0].log_odds
     maps[0].save(tmp_path / "a.map.h5")
     back = palpate.read_map(tmp_path / "a.map.h5")
@@ -70,7 +70,7 @@ def test_files_that_cannot_be_read_or_written_are_named(tmp_path: pathlib.Path) 
 @pytest.mark.parametrize("form", [str, os.fsencode, pathlib.Path])
 def test_names_of_files_need_not_be_utf8(
     form: Callable[[str], Any], tmp_path: pathlib.Path, device: palpate.Device,
-    maps: list[palpate.OccupancyGrid], unknown: palpate.Recording,
+    maps: Maps, unknown: palpate.Recording,
 ) -> None:  # fmt: skip
     name = os.fsdecode(os.fsencode(tmp_path) + b"/\xff")
     recording, grid = (form(f"{name}.{end}") for end in ("h5", "map.h5"))

@@ -1,6 +1,5 @@
 """The commands of README.md go from logs, in CSV and in a bag of ROS, to the pose of an unknown object."""
 
-import csv
 import math
 import os
 import pathlib
@@ -20,16 +19,12 @@ README = pathlib.Path(__file__).parents[2] / "README.md"
 
 def write_tables(folder: pathlib.Path, frames: list[palpate.Frame]) -> None:
     folder.mkdir()
-    with (folder / "pressures.csv").open("w") as file:
-        rows = csv.writer(file)
-        rows.writerow(["time", *(f"p{k}" for k in range(64))])
-        rows.writerows([f"{frame.host_time_s:.6f}", *frame.values] for frame in frames)
-    with (folder / "poses.csv").open("w") as file:
-        rows = csv.writer(file)
-        rows.writerow(["time", "x", "y", "yaw"])
-        for frame in frames:
-            x, y, theta = frame.T_robot_sensor
-            rows.writerow([f"{frame.host_time_s:.6f}", x / 1000, y / 1000, theta])
+    readings = [[frame.host_time_s, *frame.values] for frame in frames]
+    poses = [[frame.host_time_s, *frame.T_robot_sensor / (1000, 1000, 1)] for frame in frames]
+    header = ",".join(["time", *(f"p{k}" for k in range(64))])
+    for name, names, rows in (("pressures", header, readings), ("poses", "time,x,y,yaw", poses)):
+        formats = ["%.6f", *["%.17g"] * names.count(",")]
+        numpy.savetxt(folder / f"{name}.csv", rows, formats, ",", header=names, comments="")
 
 
 def write_frames(file: pathlib.Path, folder: pathlib.Path, frames: list[palpate.Frame]) -> None:

@@ -3,11 +3,10 @@ does not hang."""
 
 import gc
 import os
-import subprocess
-import sys
 
 import numpy
 import pytest
+from conftest import Maps, python
 
 import palpate
 
@@ -27,21 +26,12 @@ def begun(device):
 """
 
 
-def run(script: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-c", BEGIN + script, *arguments], capture_output=True, text=True, timeout=120,
-        env={**os.environ, "PYTHONWARNINGS": "ignore"},  # of forks beside threads
-    )  # fmt: skip
-
-
 def resident_kib() -> int:
     with open("/proc/self/statm") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") // 1024
 
 
-def test_objects_outlive_their_device_and_their_arrays(
-    maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
-) -> None:
+def test_objects_outlive_their_device_and_their_arrays(maps: Maps, unknown: palpate.Recording) -> None:
     device = palpate.Device.open(os.environ.get("PALPATE_DEVICE", "llvmpipe"))
     builder = palpate.MapBuilder(device)
     beliefs = [
@@ -63,7 +53,7 @@ def test_objects_outlive_their_device_and_their_arrays(
 
 
 def test_a_thousand_constructions_take_no_memory(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid], unknown: palpate.Recording
+    device: palpate.Device, maps: Maps, unknown: palpate.Recording
 ) -> None:
     lattice = palpate.PoseLattice((-5, 5, 10), (-5, 5, 10), (0, 6.28, 8))
 
@@ -172,8 +162,7 @@ in_update.wait()
 
 def test_the_interpreters_end_holds_calls_of_daemon_threads() -> None:
     before_palpate = "import atexit\nhold = []\natexit.register(lambda: hold[0]())\n"
-    done = subprocess.run([sys.executable, "-c", before_palpate + BEGIN + HELD], capture_output=True, text=True,
-                          timeout=120)  # fmt: skip
+    done = python(before_palpate + BEGIN + HELD)
     assert (done.returncode, done.stderr) == (0, "")
     went_on, refused = done.stdout.splitlines()
     assert went_on == "0"
@@ -182,7 +171,7 @@ def test_the_interpreters_end_holds_calls_of_daemon_threads() -> None:
 
 @pytest.mark.parametrize("work", ["update", "histogram", "bounds", "sensor"])
 def test_the_interpreter_ends_while_daemon_threads_are_in_calls(work: str) -> None:
-    done = run(ENDING, work)
+    done = python(BEGIN + ENDING, work)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
@@ -269,5 +258,5 @@ REFUSED = ["device:"] * 7 + ["sensor:", "device:", "Vulkan:", "Vulkan:", "True 1
     ],
 )
 def test_a_child_of_fork_is_refused_at_once_or_works(state: str, lines: list[str]) -> None:
-    done = run(FORKED, state)
+    done = python(BEGIN + FORKED, state, PYTHONWARNINGS="ignore")  # of forks beside threads
     assert (done.returncode, done.stdout.splitlines(), done.stderr) == (0, lines, "")

@@ -321,29 +321,15 @@ def test_a_dead_worker_gives_its_place_back() -> None:
 
 
 def test_the_program_of_the_guide_runs(
-    client: Any, cluster: Any, files: Files, recordings: pathlib.Path, tmp_path: pathlib.Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    files: Files, recordings: pathlib.Path, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     page = (pathlib.Path(__file__).parents[2] / "docs" / "batch.md").read_text()
     [program] = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     (tmp_path / "unknowns").mkdir()
     (tmp_path / "unknowns" / "00.h5").write_bytes((recordings / "00.h5").read_bytes())
     command("map", *files.train, "-o", f"{tmp_path}/maps/", *COARSE)
-    distributed_client = type(client)
-
-    def connect(*, n_workers: int, threads_per_worker: int) -> Any:
-        """The cluster that is there, for the sake of time."""
-        assert (n_workers, threads_per_worker) == (2, 1)
-        return distributed_client(cluster.scheduler_address, set_as_default=False)
-
-    here = os.getcwd()
-    monkeypatch.setattr("distributed.Client", connect)
     monkeypatch.chdir(tmp_path)
-    client.run(os.chdir, tmp_path)
-    try:
-        exec(program, {"__name__": "__main__"})
-    finally:
-        client.run(os.chdir, here)
+    exec(program, {"__name__": "__main__"})
     maps = pathlib.Path("maps")
     lines = batch(tmp_path / "batch", pathlib.Path("unknowns"), maps, "--filter", "bounded")
     assert (tmp_path / "dask.ndjson").read_bytes() == b"".join(lines)

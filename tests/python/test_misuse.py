@@ -3,16 +3,13 @@ that needs no device works."""
 
 import gc
 import inspect
-import os
 import pathlib
-import subprocess
-import sys
 import weakref
 from typing import Any
 
 import numpy
 import pytest
-from conftest import error_of
+from conftest import Maps, error_of, python
 
 import palpate
 from palpate import _palpate, reference
@@ -55,9 +52,7 @@ def test_keywords_are_the_options_of_the_table() -> None:
         (Raising(), ZeroDivisionError, None),
     ],
 )
-def test_an_index_that_is_none_is_refused(
-    index: int, error: type[Exception], message: str | None
-) -> None:
+def test_an_index_that_is_none_is_refused(index: int, error: type[Exception], message: str | None) -> None:
     with pytest.raises(error, match=message):
         RECORDING[index]
 
@@ -72,7 +67,7 @@ def test_indices_and_slices_are_those_of_lists() -> None:
 
 
 def test_an_axis_or_a_displacement_of_another_form_is_refused_by_name(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid]
+    device: palpate.Device, maps: Maps
 ) -> None:
     for axis in ((0, 1), (0, 1, 2.5), "abc", (0, 1, 10**30)):
         for name in ("x_mm", "y_mm", "theta_rad"):
@@ -92,12 +87,10 @@ def test_what_a_path_raises_is_raised(tmp_path: pathlib.Path) -> None:
                 use(path)
 
 
-def test_a_proxy_to_what_is_gone_is_refused(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid]
-) -> None:
+def test_a_proxy_to_what_is_gone_is_refused(belief: palpate.PoseHistogram, maps: Maps) -> None:
     gone = weakref.proxy(RECORDING[:2])
     gc.collect()
-    for use in (palpate.PoseHistogram(device, maps).update, lambda gone: palpate.recognize(gone, maps),
+    for use in (belief.update, lambda gone: palpate.recognize(gone, maps),
                 lambda gone: _palpate.write_recording("none.h5", gone),
                 lambda gone: reference.classify(gone, palpate.ContactClassifier())):  # fmt: skip
         with pytest.raises((ReferenceError, TypeError)):
@@ -114,14 +107,11 @@ def test_a_flag_of_another_type_is_refused_by_name() -> None:
             palpate.recognize(RECORDING, (), **{name: value})
 
 
-def test_a_bad_option_is_told_before_recordings_are_read(maps: list[palpate.OccupancyGrid]) -> None:
+def test_a_bad_option_is_told_before_recordings_are_read(maps: Maps) -> None:
     assert error_of(palpate.recognize, "none.h5", maps, scene="none.yaml").startswith("none.yaml: ")
 
 
-def test_progress_and_timeouts_are_checked_before_the_work(
-    device: palpate.Device, maps: list[palpate.OccupancyGrid]
-) -> None:
-    belief = palpate.PoseHistogram(device, maps)
+def test_progress_and_timeouts_are_checked_before_the_work(belief: palpate.PoseHistogram) -> None:
     with pytest.raises(TypeError):
         belief.update(RECORDING, progress=3)  # type: ignore[arg-type]
     assert belief.estimate().identity.max() == pytest.approx(1 / 3)  # nothing was taken in
@@ -146,12 +136,9 @@ for use in (lambda: palpate.open_sensor("tsf85:none").start(), palpate.Device.op
 
 def test_a_missing_loader_of_vulkan_is_an_error_that_names_the_packages() -> None:
     library = "/nonexistent/libvulkan.so.1"
-    run = subprocess.run(
-        [sys.executable, "-c", WITHOUT_VULKAN], capture_output=True, text=True, timeout=120,
-        env={**os.environ, "PALPATE_VULKAN_LIBRARY": library},
-    )  # fmt: skip
-    assert run.returncode == 0, run.stderr
-    board, *vulkan = run.stdout.splitlines()
+    done = python(WITHOUT_VULKAN, PALPATE_VULKAN_LIBRARY=library)
+    assert done.returncode == 0, done.stderr
+    board, *vulkan = done.stdout.splitlines()
     assert "not plugged in" in board
     assert len(vulkan) == 2
     for line in vulkan:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from conftest import command, run
+from conftest import Maps, command, run
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
@@ -50,9 +50,7 @@ class Paged:
 
 
 @pytest.fixture(scope="module")
-def folder(
-    tmp_path_factory: pytest.TempPathFactory, maps: list[palpate.OccupancyGrid]
-) -> pathlib.Path:
+def folder(tmp_path_factory: pytest.TempPathFactory, maps: Maps) -> pathlib.Path:
     """A folder with maps of A, E and I."""
     folder = tmp_path_factory.mktemp("page")
     (folder / "maps").mkdir()

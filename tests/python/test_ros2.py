@@ -1,9 +1,9 @@
 """The example node's work without ROS: touches are found and recognised, messages say what was found."""
 
-import ast
 import importlib
 import math
 import pathlib
+import runpy
 import sys
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +11,7 @@ from unittest.mock import MagicMock
 
 import numpy
 import pytest
-from conftest import error_of, learned, warned
+from conftest import Maps, error_of, learned, warned
 from rosbags.typesys import Stores, get_typestore
 
 import palpate
@@ -163,7 +163,7 @@ def test_planar_poses_are_those_of_a_bag(tmp_path: pathlib.Path) -> None:
 
 
 def test_frames_of_another_array_and_touches_at_the_start_are_refused(
-    maps: list[palpate.OccupancyGrid], frames: list[palpate.Frame]
+    maps: Maps, frames: list[palpate.Frame]
 ) -> None:
     array = palpate.Recording(numpy.zeros((2, 36)), [(0, 0, 0)] * 2, palpate.digitacts_array())
     stream = session.Session(array, maps)
@@ -176,66 +176,56 @@ def test_frames_of_another_array_and_touches_at_the_start_are_refused(
     assert "has no list of numbers sensors.values" in error_of(readings, message_of(frames[0]), state)
 
 
-class StandIns:
-    """What node.py takes from ROS, which is not there: a node that keeps what it publishes."""
+def stand_ins(parameters: dict[str, Any], frames: list[palpate.Frame], asked: list[tuple[str, str]]) -> Any:
+    """What node.py takes from ROS, which is not there: a node that keeps what it publishes and says, and the
+    poses of the frames, whose frames of reference are asked for."""
 
-    def __init__(self, parameters: dict[str, Any], frames: list[palpate.Frame]) -> None:
-        self.published: dict[str, list[Any]] = {"~/pose": [], "~/map": [], "~/markers": []}
-        self.said: list[str] = []
-        self.asked: list[tuple[str, str]] = []
-        outer = self
+    class Node:
+        now_s = 0.0
 
-        class Node:
-            def __init__(self, name: str) -> None:
-                assert name == "recognise"
+        def __init__(self, name: str) -> None:
+            assert name == "recognise"
+            self.published: dict[str, list[Any]] = {"~/pose": [], "~/map": [], "~/markers": []}
+            self.said: list[str] = []
 
-            def declare_parameter(self, name: str, default: Any) -> Any:
-                return SimpleNamespace(value=parameters.get(name, default))
+        def declare_parameter(self, name: str, default: Any) -> Any:
+            return SimpleNamespace(value=parameters.get(name, default))
 
-            def create_publisher(self, kind: Any, topic: str, _: Any) -> Any:
-                return SimpleNamespace(publish=lambda message: outer.publish(kind, topic, message))
+        def create_publisher(self, kind: Any, topic: str, _: Any) -> Any:
+            def publish(message: Any) -> None:
+                assert message.__msgtype__ == kind().__msgtype__
+                self.published[topic].append(message)
 
-            def create_subscription(self, *_: Any) -> None: ...
+            return SimpleNamespace(publish=publish)
 
-            def create_service(self, *_: Any) -> None: ...
+        def create_subscription(self, *_: Any) -> None: ...
 
-            def get_clock(self) -> Any:
-                return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(1e9 * outer.now_s)))
+        def create_service(self, *_: Any) -> None: ...
 
-            def get_logger(self) -> Any:
-                return SimpleNamespace(info=outer.said.append, warning=lambda text, **_: outer.said.append(text))
+        def get_clock(self) -> Any:
+            return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(1e9 * self.now_s)))
 
-        class Buffer:
-            def lookup_transform(self, target: str, source: str, at: Any, _: Any) -> Any:
-                outer.asked.append((target, source))
-                frame = min(frames, key=lambda frame: abs(frame.host_time_s - 1e-9 * at.nanoseconds))
-                x, y, theta = frame.T_robot_sensor
-                transform = new("geometry_msgs/msg/TransformStamped")
-                transform.transform.translation = TYPES.types["geometry_msgs/msg/Vector3"](x / 1000, y / 1000, 0.1)
-                transform.transform.rotation = TYPES.types["geometry_msgs/msg/Quaternion"](*about_z(theta))
-                return transform
+        def get_logger(self) -> Any:
+            return SimpleNamespace(info=self.said.append, warning=lambda text, **_: self.said.append(text))
 
-        def named(**values: Any) -> Any:
-            return SimpleNamespace(**values)
+    class Buffer:
+        def lookup_transform(self, target: str, source: str, at: Any, _: Any) -> Any:
+            asked.append((target, source))
+            frame = min(frames, key=lambda frame: abs(frame.host_time_s - 1e-9 * at.nanoseconds))
+            x, y, theta = frame.T_robot_sensor
+            transform = new("geometry_msgs/msg/TransformStamped")
+            transform.transform.translation = TYPES.types["geometry_msgs/msg/Vector3"](x / 1000, y / 1000, 0.1)
+            transform.transform.rotation = TYPES.types["geometry_msgs/msg/Quaternion"](*about_z(theta))
+            return transform
 
-        self.now_s = 0.0
-        anything: Any = MagicMock()
-        self.modules = {
-            "rclpy": anything, "rclpy.duration": anything, "rclpy.qos": anything, "std_srvs": anything,
-            "rclpy.executors": named(ExternalShutdownException=OSError, MultiThreadedExecutor=anything),
-            "rclpy.node": named(Node=Node), "rclpy.time": named(Time=named),
-            "rosidl_runtime_py": anything, "std_srvs.srv": anything,
-            "rosidl_runtime_py.utilities": named(get_message=lambda kind: lambda: new(kind)),
-            "tf2_ros": named(Buffer=Buffer, TransformException=KeyError, TransformListener=lambda *_: None),
-        }  # fmt: skip
-
-    def publish(self, kind: Any, topic: str, message: Any) -> None:
-        assert message.__msgtype__ == kind().__msgtype__
-        self.published[topic].append(message)
+    return MagicMock(
+        Node=Node, Buffer=Buffer, Time=SimpleNamespace, TransformException=KeyError, ExternalShutdownException=OSError,
+        get_message=lambda kind: lambda: new(kind),
+    )  # fmt: skip
 
 
 def test_the_node_publishes_what_it_finds(
-    maps: list[palpate.OccupancyGrid], frames: list[palpate.Frame], tmp_path: pathlib.Path,
+    maps: Maps, frames: list[palpate.Frame], tmp_path: pathlib.Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     for grid in maps[:2]:
@@ -245,21 +235,23 @@ def test_the_node_publishes_what_it_finds(
     array = palpate.Recording(numpy.zeros((2, 36)), [(0, 0, 0)] * 2, palpate.digitacts_array(), valid=valid)
     array.save(tmp_path / "A.h5")
     parameters = {"maps": str(tmp_path), "recording": str(tmp_path / "A.h5"), "base_frame": "base"}
-    ros = StandIns(parameters, frames)
-    for name, module in ros.modules.items():
-        monkeypatch.setitem(sys.modules, name, module)
+    asked: list[tuple[str, str]] = []
+    ros = stand_ins(parameters, frames, asked)
+    for name in ("rclpy", "rclpy.duration", "rclpy.executors", "rclpy.node", "rclpy.qos", "rclpy.time",
+                 "rosidl_runtime_py", "rosidl_runtime_py.utilities", "std_srvs", "std_srvs.srv", "tf2_ros"):  # fmt: skip
+        monkeypatch.setitem(sys.modules, name, ros)
     monkeypatch.delitem(sys.modules, "palpate_ros2.node", raising=False)
     node = importlib.import_module("palpate_ros2.node").Recognise()
     for frame in frames:
-        ros.now_s = frame.host_time_s
+        node.now_s = frame.host_time_s
         message = message_of(frame)
-        message.data[7] = 1e3 * len(ros.asked)  # of the dead element
+        message.data[7] = 1e3 * len(asked)  # of the dead element
         node.take(message)
-    assert ros.asked == [("base", "array")] * 4
-    assert [text for text in ros.said if text.startswith("touch 4: E with probability 1.000, fits")]
+    assert asked == [("base", "array")] * 4
+    assert [text for text in node.said if text.startswith("touch 4: E with probability 1.000, fits")]
     # Each message where something was found; the pose where it is sure.
-    assert len(ros.published["~/map"]) == len(ros.published["~/markers"]) >= len(ros.published["~/pose"]) >= 1
-    pose = sent(ros.published["~/pose"][-1])
+    assert len(node.published["~/map"]) == len(node.published["~/markers"]) >= len(node.published["~/pose"]) >= 1
+    pose = sent(node.published["~/pose"][-1])
     assert pose.header.frame_id == "base"
     at = pose.pose.pose.position
     assert (at.x, at.y, at.z) == pytest.approx((*T_ROBOT_OBJECT[:2] / 1000, 0.1), abs=1e-3)
@@ -267,22 +259,17 @@ def test_the_node_publishes_what_it_finds(
     message = message_of(frames[0])
     message.data = message.data[:35]
     node.take(message)
-    assert "35 readings for an array of 36 elements" in ros.said[-1]
+    assert "35 readings for an array of 36 elements" in node.said[-1]
 
 
-def test_the_launch_file_has_the_nodes_parameters() -> None:
-    node = ast.parse((ROOT / "palpate_ros2" / "node.py").read_text())
-    declared = {
-        call.args[0].value: call.args[1].value
-        for call in ast.walk(node)
-        if isinstance(call, ast.Call) and getattr(call.func, "id", "") in ("text", "number")
-    }
-    launch = ast.parse((ROOT / "launch" / "recognise.launch.py").read_text())
-    given = {
-        target.id: ast.literal_eval(step.value)
-        for step in launch.body
-        if isinstance(step, ast.Assign)
-        for target in step.targets
-    }
-    numbers = {name: float(value) for name, value in given["NUMBERS"].items()}
-    assert {**given["TEXTS"], **numbers} == declared
+def test_the_launch_takes_the_nodes_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
+    ros: Any = MagicMock()
+    for name in ("launch", "launch.actions", "launch.substitutions", "launch_ros.actions",
+                 "launch_ros.parameter_descriptions"):  # fmt: skip
+        monkeypatch.setitem(sys.modules, name, ros)
+    runpy.run_path(str(ROOT / "launch" / "recognise.launch.py"))["generate_launch_description"]()
+    [node] = ros.Node.call_args_list
+    [values] = node.kwargs["parameters"]
+    assert {"maps", "pressure_topic", "onset"} <= values.keys()
+    declared = [each.args[0] for each in ros.DeclareLaunchArgument.call_args_list]
+    assert declared == list(values)

@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import numpy
 import pytest
-from conftest import Files, command, comparable, expect_refused, printed, warned
+from conftest import Files, built, command, comparable, expect_refused, printed, warned
 
 import palpate
 
@@ -47,13 +47,10 @@ def test_records_of_what_is_in_memory(files: Files) -> None:
     assert comparable(given) == comparable(expected)
 
 
-def test_the_cells_of_a_map_and_the_readings_of_a_simulation(
-    files: Files, device: palpate.Device
-) -> None:
-    builder = palpate.MapBuilder(device)
-    builder.add(palpate.read_recording(files.train[0]))
-    assert numpy.array_equal(builder.build("A").log_odds, palpate.read_map(files.maps / "A.map.h5").log_odds)
-    assert numpy.array_equal(palpate.simulate("A", seed=1).pressure, palpate.read_recording(files.train[0]).pressure)
+def test_the_cells_of_a_map_and_the_readings_of_a_simulation(files: Files, device: palpate.Device) -> None:
+    touches = palpate.read_recording(files.train[0])
+    assert numpy.array_equal(built(device, touches).log_odds, palpate.read_map(files.maps / "A.map.h5").log_odds)
+    assert numpy.array_equal(palpate.simulate("A", seed=1).pressure, touches.pressure)
 
 
 def test_the_bins_of_a_histogram(files: Files, device: palpate.Device, tmp_path: pathlib.Path) -> None:

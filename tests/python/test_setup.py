@@ -4,7 +4,7 @@ import json
 import pathlib
 
 import numpy
-from conftest import command, error_of
+from conftest import built, command, error_of
 
 import palpate
 
@@ -38,9 +38,7 @@ def test_frames_of_objects(device: palpate.Device) -> None:
     learned = palpate.simulate("E", palpate.random_poses(60, seed=5), seed=5)
     poses = [palpate.compose((600, 100, 0.3), pose) for pose in learned.T_robot_sensor]
     far = palpate.Recording(learned.pressure, poses, learned.elements_mm, object="E")
-    builder = palpate.MapBuilder(device)
-    builder.add(far)
-    grid = builder.build("E")
+    grid = built(device, far)
     assert grid.T_learned_robot_object.tolist() == [0, 0, 0]
     origin = grid.origin_mm.copy()
     grid.centre_frame()

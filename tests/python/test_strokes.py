@@ -5,7 +5,7 @@ import subprocess
 
 import numpy
 import pytest
-from conftest import run
+from conftest import Maps, run
 from numpy.typing import NDArray
 
 import palpate
@@ -54,7 +54,7 @@ def cut(
 
 
 def test_strokes_recognise_as_presses_at_the_same_places(
-    tmp_path: pathlib.Path, maps: list[palpate.OccupancyGrid], device: palpate.Device
+    tmp_path: pathlib.Path, maps: Maps, device: palpate.Device
 ) -> None:
     done = cut(tmp_path, STROKES, "--slide", "4")
     assert done.returncode == 0, done.stderr

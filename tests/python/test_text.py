@@ -6,13 +6,11 @@ import pathlib
 import urllib.request
 
 import pytest
-from conftest import error_of
+from conftest import Maps, error_of
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import palpate
-
-Maps = list[palpate.OccupancyGrid]
 
 
 @pytest.fixture(scope="module")
@@ -22,18 +20,17 @@ def record(device: palpate.Device, maps: Maps, unknown: palpate.Recording) -> pa
 
 
 def test_texts_tell_what_an_object_is(
-    device: palpate.Device, maps: Maps, unknown: palpate.Recording, record: palpate.Record
-) -> None:
+    device: palpate.Device, maps: Maps, unknown: palpate.Recording, posterior: palpate.PoseHistogram,
+    record: palpate.Record,
+) -> None:  # fmt: skip
     assert repr(device).startswith("Device('llvmpipe") or device.name not in ("", "llvmpipe")
     assert repr(maps[0]).startswith("OccupancyGrid('A', ")
     assert repr(unknown) == "Recording(9 touches of 36 elements in kPa)"
     assert repr(unknown[0]).startswith("Touch(36 elements at x ")
     assert "host_time_s=1764123456.789, " in repr(palpate.Frame(1764123456.789, [0.0]))
-    belief = palpate.PoseHistogram(device, maps)
-    assert repr(belief) == f"PoseHistogram(A, E, I on '{device.name}')"
-    belief.update(unknown)
-    assert "mode of object 1: x " in repr(belief.estimate())
-    assert "+-" in repr(belief.refine())
+    assert repr(posterior) == f"PoseHistogram(A, E, I on '{device.name}')"
+    assert "mode of object 1: x " in repr(posterior.estimate())
+    assert "+-" in repr(posterior.refine())
     assert repr(record).startswith("Record('E' with probability ")
 
 
@@ -48,11 +45,9 @@ def test_records_complete_and_hold_arrays(record: palpate.Record) -> None:
 
 
 def test_pictures_are_of_maps_beliefs_and_records(
-    device: palpate.Device, maps: Maps, unknown: palpate.Recording, record: palpate.Record
+    maps: Maps, unknown: palpate.Recording, posterior: palpate.PoseHistogram, record: palpate.Record
 ) -> None:
-    belief = palpate.PoseHistogram(device, maps)
-    belief.update(unknown)
-    for shown in (maps[0], belief.marginals(1)):
+    for shown in (maps[0], posterior.marginals(1)):
         png = shown._repr_png_()
         assert png is not None and png.startswith(b"\x89PNG")
 

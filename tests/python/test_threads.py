@@ -2,19 +2,17 @@
 
 import os
 import signal
-import subprocess
-import sys
 import threading
 
 import numpy
 import pytest
 import tqdm
+from conftest import Maps, python
 
 import palpate
 
 # Updates by nine touches of this lattice take a tenth of a second and more.
 LARGE = palpate.PoseLattice(x_mm=(-20, 20, 60), y_mm=(-20, 20, 60), theta_rad=(0, 6.28, 30))
-Maps = list[palpate.OccupancyGrid]
 
 
 def test_other_threads_and_signal_handlers_run_during_an_update(
@@ -100,10 +98,8 @@ def test_progress_comes_on_the_calling_thread(
 
 
 def test_what_progress_raises_ends_the_call(
-    device: palpate.Device, maps: Maps, unknown: palpate.Recording
+    device: palpate.Device, belief: palpate.PoseHistogram, unknown: palpate.Recording
 ) -> None:
-    belief = palpate.PoseHistogram(device, maps)
-
     def refuse(fraction: float) -> None:
         raise ZeroDivisionError
 
@@ -186,9 +182,9 @@ with palpate.open_sensor("simulate:E,rate=1") as sensor:
 
 
 def test_ctrl_c_ends_a_call() -> None:
-    run = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, timeout=120)
-    assert (run.returncode, run.stderr) == (0, "")
-    assert run.stdout.splitlines() == [
+    done = python(INTERRUPTED)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines() == [
         "histogram interrupted", "True", "1.0", "bounds interrupted", "marginals interrupted", "1.0",
         "recognize interrupted", "recognize by bounds interrupted", "map interrupted", "sensor interrupted",
     ]  # fmt: skip

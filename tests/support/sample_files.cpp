@@ -47,6 +47,14 @@ Recording sample_training(const std::string& letter, int touches) {
   return touch(letter, {}, touches);
 }
 
+Recording sample_presses(const std::string& shape, int presses, std::uint64_t seed) {
+  std::vector<Pose> T_object_sensor = random_poses(presses, seed);
+  for (Pose& pose : T_object_sensor) {
+    pose.translation_mm *= 0.3;
+  }
+  return Simulator(make_shape(shape), {}, grid_array(16, 16, 2.0), seed).touch(T_object_sensor, {});
+}
+
 Recording part_of(const Recording& recording, std::size_t begin, std::size_t end) {
   const auto rows = [&](auto& values, std::size_t width) {
     values.erase(values.begin() + static_cast<std::ptrdiff_t>(end * width), values.end());

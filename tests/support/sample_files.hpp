@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "palpate/files.hpp"
@@ -16,6 +17,10 @@ Recording sample_unknown(const std::string& letter, const Pose& T_object_robot, 
 
 /// Simulated touches of a letter at known poses, to build a map of.
 Recording sample_training(const std::string& letter, int touches);
+
+/// Presses of an array of 16 x 16 elements, 2 mm apart, that sees a shape whole; the poses
+/// T_object_sensor are within 3 mm of its middle.
+Recording sample_presses(const std::string& shape, int presses, std::uint64_t seed);
 
 /// The touches [begin, end) of a recording as one of their own.
 Recording part_of(const Recording& recording, std::size_t begin, std::size_t end);

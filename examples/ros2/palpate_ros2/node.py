@@ -15,6 +15,7 @@ from rosidl_runtime_py.utilities import get_message
 from std_srvs.srv import Trigger
 from tf2_ros import Buffer, TransformException, TransformListener
 
+from . import PARAMETERS
 from .conversion import map_message, marker_messages, nanoseconds_of, pose_message
 from .session import Session, planar_pose
 
@@ -29,23 +30,21 @@ class Recognise(Node):  # type: ignore[misc]  # of rclpy, which mypy may not fin
 
     def __init__(self) -> None:
         super().__init__("recognise")
-        text, number = self._text, self._number
-        self.base, self.sensor_frame = text("base_frame", "base_link"), text("array_frame", "array")
-        self.type = text("pressure_type", "std_msgs/msg/Float32MultiArray")
-        self.field = text("pressure_field", "")
-        self.least_probability = number("least_probability", 0.99)
-        maps = sorted(pathlib.Path(text("maps", "maps")).glob("*.map.h5"))
+        given: dict[str, Any] = {
+            name: self.declare_parameter(name, default).value for name, default in PARAMETERS.items()
+        }
+        self.base, self.sensor_frame = given["base_frame"], given["array_frame"]
+        self.type, self.field = given["pressure_type"], given["pressure_field"]
+        self.least_probability = given["least_probability"]
+        maps = sorted(pathlib.Path(given["maps"]).glob("*.map.h5"))
         if not maps:
             raise palpate.Error("maps: holds no *.map.h5; give a folder that `palpate map` has written")
-        options: dict[str, Any] = {"none": "auto"}
-        if (threshold := number("threshold", 0.0)) > 0.0:
-            options["threshold"] = threshold
         self.session = Session(
-            palpate.read_recording(text("recording", "recording.h5")),
+            palpate.read_recording(given["recording"]),
             [palpate.read_map(path) for path in maps],
-            onset=number("onset", 2.0),
-            tare_s=number("tare_s", 0.5),
-            options=options,
+            onset=given["onset"],
+            tare_s=given["tare_s"],
+            options={"none": "auto", "threshold": given["threshold"] or None},
         )
         self.tf = Buffer()
         self.listener = TransformListener(self.tf, self)
@@ -55,18 +54,11 @@ class Recognise(Node):  # type: ignore[misc]  # of rclpy, which mypy may not fin
         self.markers = self._publisher("visualization_msgs/msg/MarkerArray", "~/markers", latest)
         # Frames wait here while an estimate is under way.
         waiting = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
-        topic = text("pressure_topic", "pressure")
-        self.create_subscription(get_message(self.type), topic, self.take, waiting)
+        self.create_subscription(get_message(self.type), given["pressure_topic"], self.take, waiting)
         self.create_service(Trigger, "~/next_unknown", self.next_unknown)
 
     def _publisher(self, kind: str, topic: str, qos: Any) -> Any:
         return self.create_publisher(get_message(kind), topic, qos)
-
-    def _text(self, name: str, default: str) -> str:
-        return str(self.declare_parameter(name, default).value)
-
-    def _number(self, name: str, default: float) -> float:
-        return float(self.declare_parameter(name, default).value)
 
     def next_unknown(self, _: Any, response: Any) -> Any:
         """The touches to come are of another object."""

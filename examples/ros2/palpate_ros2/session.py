@@ -101,15 +101,8 @@ def planar_pose(transform: Any) -> tuple[tuple[float, float, float], float]:
 
 def covariance_of(record: palpate.Record) -> NDArray[numpy.float64]:
     """[3, 3] of record.refined.T_robot_object, in mm and rad, from that of T_object_robot."""
-    refined = record.refined
-    x, y, theta = refined.x_mm, refined.y_mm, refined.theta_rad
-    inverse = palpate.inverse((x, y, theta))
-    c, s = math.cos(theta), math.sin(theta)
-    jacobian = numpy.array([[-c, -s, inverse[1]], [s, -c, -inverse[0]], [0.0, 0.0, -1.0]])
-    # A symmetric object's frame may stand for a turned one.
-    turned = palpate.compose((x, y, theta), refined.T_robot_object)
-    u, v = palpate.transform((0.0, 0.0, inverse[2]), [turned[:2]])[0]
-    turn = numpy.array([[1.0, 0.0, -v], [0.0, 1.0, u], [0.0, 0.0, 1.0]])
-    both = turn @ jacobian
-    carried: NDArray[numpy.float64] = both @ numpy.asarray(refined.covariance) @ both.T
+    x, y, _ = record.refined.T_robot_object
+    c, s = math.cos(record.refined.theta_rad), math.sin(record.refined.theta_rad)
+    jacobian = numpy.array([[-c, -s, y], [s, -c, -x], [0.0, 0.0, -1.0]])
+    carried: NDArray[numpy.float64] = jacobian @ numpy.asarray(record.refined.covariance) @ jacobian.T
     return carried
