@@ -37,9 +37,11 @@ TEST_F(PosteriorFile, ComesBackAsItWasWrittenWholeOrObjectByObject) {
     const Posterior read = read_posterior(path_);
     EXPECT_EQ(read.objects, written.objects);
     EXPECT_EQ(read.log_likelihood, written.log_likelihood);
-    EXPECT_TRUE(same(read.lattice.x_mm, written.lattice.x_mm));
-    EXPECT_TRUE(same(read.lattice.y_mm, written.lattice.y_mm));
-    EXPECT_TRUE(same(read.lattice.theta_rad, written.lattice.theta_rad));
+    for (const auto axis : {&PoseLattice::x_mm, &PoseLattice::y_mm, &PoseLattice::theta_rad}) {
+      const auto ends = [&](const Axis& of) { return bits_of(std::vector{of.lower, of.upper}); };
+      EXPECT_EQ(ends(read.lattice.*axis), ends(written.lattice.*axis));
+      EXPECT_EQ((read.lattice.*axis).count, (written.lattice.*axis).count);
+    }
     EXPECT_EQ(read.lattice.pivot_mm, written.lattice.pivot_mm);
     std::vector<std::size_t> asked;
     write_posterior(path_, written.objects, written.lattice, [&](std::size_t object) {

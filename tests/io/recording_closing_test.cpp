@@ -1,16 +1,13 @@
 // A recording that was cut off is closed for programs other than Palpate.
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <functional>
 
 #include "file_parts.hpp"
 #include "io/recording_state.hpp"
 #include "numbered_frames.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
+#include "support/child_process.hpp"
 #include "support/limits.hpp"
 
 namespace palpate::recording_closing_test {
@@ -21,21 +18,9 @@ class RecordingClosing : public OneFile {
  protected:
   RecordingClosing() : OneFile("frames.h5") {}
 
-  // How a process of its own ends that does this.
-  static int status_of(const std::function<void()>& work) {
-    const pid_t pid = ::fork();
-    if (pid == 0) {
-      work();
-      ::_exit(0);  // as a kill
-    }
-    int status = -1;
-    ::waitpid(pid, &status, 0);
-    return status;
-  }
-
   // A recording of so many frames whose recorder ended without closing it.
   void cut_off(std::size_t frames) const {
-    const auto record = [&] {
+    const int status = status_of([&] {
       FrameRecorder recorder(path_, sensor_of(elements));
       for (std::size_t i = 0; i < frames; ++i) {
         recorder.add(frame_of(i, elements));
@@ -45,8 +30,8 @@ class RecordingClosing : public OneFile {
       }
       recorder.flush();
       ::_exit(0);  // before the recorder closes it
-    };
-    ASSERT_EQ(status_of(record), 0);
+    });
+    ASSERT_EQ(status, 0);
   }
 
   // Marks the file as open, as a recorder that was killed leaves it.
@@ -152,12 +137,7 @@ TEST_F(RecordingClosing, WhileItIsRecordedIsRefusedAndCostsNothing) {
   EXPECT_FALSE(read_recording(path_).closed);
   const auto close = [&] { close_recording(path_); };
   expect_named(refusal(close), {"recording", "wait"});
-  EXPECT_EQ(status_of([&] {
-              refusal(close);
-              ::_exit(HasFailure() ? 1 : 0);
-            }),
-            0)
-      << "another process is refused as well";
+  EXPECT_EQ(status_of([&] { refusal(close); }), 0) << "another process is refused as well";
   record_to(1000);
   recorder.close();
   EXPECT_TRUE(read_recording(path_).closed);
@@ -187,7 +167,6 @@ TEST_F(RecordingClosing, NeedsTheRightToWrite) {
               constexpr uid_t nobody = 65534;
               EXPECT_EQ(::setuid(::getuid() == 0 ? nobody : ::getuid()), 0);  // root may all
               expect_named(refusal([&] { close_recording(path_); }), {"permissions"});
-              ::_exit(HasFailure() ? 1 : 0);
             }),
             0);
   expect_frames(300);
