@@ -129,21 +129,28 @@ class FrameRecorderProcess : public FrameRecorderFile {
   // Adds a frame and counts it.
   void add_next(FrameRecorder& recorder) { recorder.add(frame_of(added_++, elements)); }
 
-  // Expects the stream's beginning in the file, where there is one, and all but the last second of
-  // what was added. Removes the file and says whether there was one.
-  bool removed_whole() {
-    const bool there = std::filesystem::exists(path_);
-    std::size_t kept = 0;
-    if (there) {
-      const Recording read = read_recording(path_);
-      expect_prefix(read, elements);
-      kept = read.size();
-      std::filesystem::remove(path_);
+  // Expects of recorders in processes of their own that end with this status: the stream's
+  // beginning in the file, where there is one, and all but the last second of what was added.
+  void expect_whole(int runs, int status, const std::function<void()>& record) {
+    int appeared = 0;
+    for (int run = 0; run < runs; ++run) {
+      SCOPED_TRACE(run);
+      random_.discard(4);  // each run has draws of its own
+      EXPECT_EQ(status_of(record), status);
+      std::size_t kept = 0;
+      if (std::filesystem::exists(path_)) {
+        const Recording read = read_recording(path_);
+        expect_prefix(read, elements);
+        kept = read.size();
+        std::filesystem::remove(path_);
+        ++appeared;
+      }
+      EXPECT_LE(static_cast<double>(added_.exchange(0) - kept) / frame_rate_hz, 1.0);
     }
-    EXPECT_LE(static_cast<double>(added_.exchange(0) - kept) / frame_rate_hz, 1.0);
-    return there;
+    EXPECT_GE(appeared, runs / 2);  // the first rows are saved after 250 frames
   }
 
+  std::mt19937_64 random_{20110509};
   // Of all processes.
   Count& added_ = *new (::mmap(nullptr, sizeof(Count), PROT_READ | PROT_WRITE,
                                MAP_SHARED | MAP_ANONYMOUS, -1, 0)) Count(0);
@@ -187,53 +194,34 @@ TEST_F(FrameRecorderProcess, FileIsReadAsBeingRecordedFromTheMomentItAppears) {
 }
 
 TEST_F(FrameRecorderProcess, KilledAtAnyMomentHoldsAllButTheLastSecond) {
-  std::mt19937_64 random(20110509);
-  const int runs = trials(20);
-  int appeared = 0;
-  for (int run = 0; run < runs; ++run) {
-    SCOPED_TRACE(run);
+  expect_whole(trials(20), SIGALRM, [&] {
     // As fast as the machine can: most of the time goes into saving, where a kill hurts most. After
     // a number of frames, not a time, so that a slow machine is as far; then some way into saving.
-    const std::size_t frames = random() % 5000;
-    const auto into_saving_us = static_cast<useconds_t>(1 + random() % 2000);
-    const int status = status_of([&] {
-      FrameRecorder recorder(path_, sensor_of(elements));
-      for (;;) {
-        if (added_ == frames) {
-          ::ualarm(into_saving_us, 0);
-        }
-        add_next(recorder);
+    const std::size_t frames = random_() % 5000;
+    const auto into_saving_us = static_cast<useconds_t>(1 + random_() % 2000);
+    FrameRecorder recorder(path_, sensor_of(elements));
+    for (;;) {
+      if (added_ == frames) {
+        ::ualarm(into_saving_us, 0);
       }
-    });
-    EXPECT_EQ(status, SIGALRM);
-    appeared += removed_whole() ? 1 : 0;
-  }
-  EXPECT_GE(appeared, runs * 3 / 4);  // the first rows are saved after 250 frames
+      add_next(recorder);
+    }
+  });
 }
 
 TEST_F(FrameRecorderProcess, FullDiskIsOneErrorAndLeavesWhatWasSaved) {
-  std::mt19937_64 random(7);
-  const int runs = trials(10);
-  int appeared = 0;
-  for (int run = 0; run < runs; ++run) {
-    SCOPED_TRACE(run);
-    const rlim_t bytes = 1000 + random() % 1500000;
-    const int status = status_of([&] {
-      std::signal(SIGXFSZ, SIG_IGN);  // errors of writing, not signals
-      limit_process(RLIMIT_FSIZE, bytes);
-      const std::string said = error_of(Fault::system, [&] {
-        FrameRecorder recorder(path_, sensor_of(elements));
-        while (added_ < 20000) {
-          add_next(recorder);
-        }
-      });
-      expect_named(said, {"stream.h5", "File too large"});
-      std::exit(HasFailure() ? 1 : 0);  // as a program ends: HDF5 crashes then, if it is not closed
+  expect_whole(trials(10), 0, [&] {
+    std::signal(SIGXFSZ, SIG_IGN);  // errors of writing, not signals
+    limit_process(RLIMIT_FSIZE, 1000 + random_() % 1500000);
+    const std::string said = error_of(Fault::system, [&] {
+      FrameRecorder recorder(path_, sensor_of(elements));
+      while (added_ < 20000) {
+        add_next(recorder);
+      }
     });
-    EXPECT_EQ(status, 0);
-    appeared += removed_whole() ? 1 : 0;
-  }
-  EXPECT_GE(appeared, runs / 2);
+    expect_named(said, {"stream.h5", "File too large"});
+    std::exit(HasFailure() ? 1 : 0);  // as a program ends: HDF5 crashes then, if it is not closed
+  });
 }
 
 }  // namespace palpate::frame_recorder_test

@@ -8,7 +8,7 @@ namespace palpate::pose_track_test {
 
 constexpr double pi = std::numbers::pi;
 
-TEST(PoseTrack, InterpolatesBetweenPoses) {
+TEST(PoseTrack, InterpolatesBetweenPosesTheShortWay) {
   PoseTrack track(1.0);
   EXPECT_TRUE(track.add(10.0, {{0.0, 4.0}, 0.5}));
   EXPECT_TRUE(track.add(11.0, {{2.0, 0.0}, 1.5}));
@@ -19,14 +19,8 @@ TEST(PoseTrack, InterpolatesBetweenPoses) {
   EXPECT_DOUBLE_EQ(pose->theta_rad, 0.75);
   EXPECT_DOUBLE_EQ(track.at(11.0)->theta_rad, 1.5);
   EXPECT_DOUBLE_EQ(track.at(10.0)->theta_rad, 0.5);
-}
-
-TEST(PoseTrack, TurnsTheShortWay) {
-  PoseTrack track(1.0);
-  track.add(0.0, {{}, pi - 0.1});
-  track.add(1.0, {{}, -pi + 0.1});
-  EXPECT_NEAR(track.at(0.5)->theta_rad, pi, 1e-12);  // rounding
-  EXPECT_NEAR(track.at(0.75)->theta_rad, pi + 0.05, 1e-12);
+  track.add(12.0, {{}, 1.5 + 2.0 * pi - 0.2});
+  EXPECT_NEAR(track.at(11.75)->theta_rad, 1.5 - 0.15, 1e-12);  // rounding
 }
 
 TEST(PoseTrack, KnowsNothingOutsideAndInAGap) {
