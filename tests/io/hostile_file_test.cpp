@@ -117,12 +117,10 @@ TEST_F(OutsideFile, FiltersAreNotLoaded) {
       return bytes;
     };
     ASSERT_GE(H5Zregister(&filter), 0);
-    const Hdf5Handle storage = storage_in({});
-    H5Pset_chunk(storage.get(), 2, shape_.data());
+    const Hdf5Handle storage = storage_in(shape_);
     H5Pset_filter(storage.get(), filter.id, H5Z_FLAG_MANDATORY, 0, nullptr);
-    const std::vector<float> values(6, 1.0F);
-    put_values(new_dataset(file, "pressure", H5T_NATIVE_FLOAT, space_of(shape_), storage.get()),
-               H5T_NATIVE_FLOAT, values.data());
+    H5Pset_alloc_time(storage.get(), H5D_ALLOC_TIME_EARLY);
+    new_dataset(file, "pressure", H5T_NATIVE_FLOAT, space_of(shape_), storage.get());
   });
   H5PLremove(0);
 }

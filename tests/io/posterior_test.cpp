@@ -54,21 +54,6 @@ TEST_F(PosteriorFile, ComesBackAsItWasWrittenWholeOrObjectByObject) {
   }
 }
 
-TEST_F(PosteriorFile, OfAnObjectThatIsNotSoundIsNeverWritten) {
-  const PoseLattice lattice;
-  const auto bins = static_cast<std::size_t>(lattice.bins());
-  for (const auto& [second, named] : {std::pair{std::vector<double>(bins - 1, -1.0), "'B'"},
-                                      {std::vector<double>(bins, nan), "'log_likelihood'"}}) {
-    expect_named(refusal([&] {
-                   write_posterior(path_, {"A", "B"}, lattice, [&](std::size_t object) {
-                     return object == 0 ? std::vector<double>(bins, -1.0) : second;
-                   });
-                 }),
-                 {named});
-  }
-  EXPECT_FALSE(std::filesystem::exists(path_));
-}
-
 Posterior of_some_bins() {
   return {.objects = {"A", "B"},
           .lattice = {.x_mm = {-10, 10, 20}, .y_mm = {-5, 5, 10}, .theta_rad = {0, 6, 5}},
@@ -117,6 +102,16 @@ TEST_F(PosteriorFile, ThatIsNotSoundIsNeverWritten) {
   }
   constexpr Axis most{0, 1, std::numeric_limits<int>::max()};
   expect_refused("too many", of_some, [&](Posterior& p) { p.lattice = {most, most, most}; });
+  for (const auto& [second, named] : {std::pair{std::vector{-1.0}, "'B'"},
+                                      {std::vector{nan, -1.0}, "'log_likelihood' holds nan"}}) {
+    const auto of_object = [&, &second = second](std::size_t object) {
+      return object == 0 ? of_all.log_likelihood : second;
+    };
+    expect_named(refusal([&] {
+                   write_posterior(path_, {"A", "B"}, of_all.lattice, of_object);
+                 }),
+                 {named});
+  }
   EXPECT_FALSE(std::filesystem::exists(path_));
 }
 

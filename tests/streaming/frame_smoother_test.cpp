@@ -4,11 +4,11 @@
 
 #include <cfloat>
 #include <cmath>
-#include <random>
 
 #include "palpate/touch_detector.hpp"
 #include "press.hpp"
 #include "support/limits.hpp"
+#include "support/synthetic.hpp"
 
 namespace palpate::frame_smoother_test {
 
@@ -18,13 +18,10 @@ constexpr double smooth_s = 5.0 * period_s;
 constexpr double gap_s = 64.0 * period_s;
 
 std::vector<std::vector<double>> noise(std::size_t frames, std::size_t elements) {
-  std::mt19937_64 random(11);
-  std::normal_distribution<double> normal(20.0, 3.0);
+  Uniform random(11);
   std::vector<std::vector<double>> values(frames, std::vector<double>(elements));
   for (std::vector<double>& frame : values) {
-    for (double& value : frame) {
-      value = normal(random);
-    }
+    std::ranges::generate(frame, [&] { return random(10.0, 30.0); });
   }
   return values;
 }
