@@ -170,27 +170,20 @@ class LargeFile : public OneFile {
   }
 };
 
-// 67 MB of cells, stored as 18 KB for each of 16 chunks. What compresses by a factor of 1000 takes
-// its time to read; a limit is for what is read.
-TEST_F(LargeFile, MapIsSummarizedInPiecesAndReadWhole) {
+// 67 MB of cells and 42 MB of pressures.
+TEST_F(LargeFile, IsSummarizedInPieces) {
+  if (sanitized || !limits_memory()) {
+    GTEST_SKIP() << "memory of processes is not limited here";
+  }
   constexpr hsize_t edge = 1024;
   map_parts().without("log_odds").save(path_);
   add_constant(path_, "log_odds", {4 * edge, 4 * edge}, {edge, edge}, 0.0F);
-  EXPECT_EQ(read_map(path_).log_odds.size(), 4096u * 4096u);
-  if (sanitized) {
-    GTEST_SKIP() << "the sanitizer holds memory of its own";
-  }
   EXPECT_TRUE(done_with_memory(40 * mib, [&] {
     const MapSummary summary = summarize_map(path_);
     return summary.head.nx == 4096 && summary.occupied == 0 && summary.log_odds.most == 0.0;
   }));
-}
-
-// 42 MB of pressures.
-TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
-  if (sanitized || !limits_memory()) {
-    GTEST_SKIP() << "memory of processes is not limited here";
-  }
+  // What compresses by a factor of 1000 takes its time to read; a limit is for what is read.
+  EXPECT_EQ(read_map(path_).log_odds.size(), 4096u * 4096u);
   constexpr hsize_t rows = 64 * 4096;
   constexpr hsize_t elements = 40;
   recording_parts()

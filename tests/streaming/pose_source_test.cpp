@@ -110,15 +110,7 @@ TEST_F(PoseSource, FileServesEveryStart) {
     for (int run = 1; run <= 2; ++run) {
       sensor.start();
       add_frames(0, 100);
-      for (int i = 0; i < 100; ++i) {
-        const auto pose = sensor.next(0ms)->T_robot_sensor;
-        ASSERT_EQ(pose.has_value(), i < 50) << i;
-        if (pose) {
-          EXPECT_NEAR(pose->translation_mm.x, i + 0.5, 1e-4);  // of 1.7e9 s float64 resolves 2e-7
-          EXPECT_EQ(pose->translation_mm.y, 1.0);
-          EXPECT_EQ(pose->theta_rad, 0.5);
-        }
-      }
+      EXPECT_EQ(posed_frames(sensor), 50u);
       EXPECT_EQ(sensor.poses().read, 51u);
       EXPECT_EQ(sensor.poses().refused, 0u);
       EXPECT_EQ(sensor.poses().frames, 50u) << "since start()";
