@@ -98,9 +98,8 @@ TEST_F(SceneFile, TakesTheArrayAsAListOrFromAFileBesideIt) {
   put_bytes(pads, "# two pads\n\n-1 0.5 # left\r\n\t1.5e0\t-2\n");
   EXPECT_EQ(read("array: pads.txt").array_mm, (std::vector<glm::dvec2>{{-1, 0.5}, {1.5, -2}}));
   // Csv has all that is no row.
-  for (const auto& [text, place] : {std::pair{"1 2\n3\n", ":2:"},
-                                    {"1 2\nnan 1\n", ":2:"},
-                                    {"# none\n", "holds no row"}}) {
+  for (const auto& [text, place] :
+       {std::pair{"1 2\n3\n", ":2:"}, {"1 2\nnan 1\n", ":2:"}, {"# none\n", "holds no row"}}) {
     put_bytes(pads, text);
     expect_named(input_error([&] { read("array: pads.txt"); }), {pads.c_str(), place});
   }

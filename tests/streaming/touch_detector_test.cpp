@@ -252,7 +252,7 @@ TEST(Baseline, IsTheMedianOfEveryElementThatIsNotDead) {
   EXPECT_EQ(baseline[2], 0.0);
 }
 
-TEST(Baseline, RefusesATouchedArray) {
+TEST(Baseline, RefusesATouchedArrayAndNothingToGoBy) {
   auto frames = PressStream{}.frames(1.0, [](double t) {
     return std::vector<double>{3.0, 3.0 + 5.0 * press(t, 0.3, 10.0)};
   });
@@ -270,11 +270,8 @@ TEST(Baseline, RefusesATouchedArray) {
   frames[7].values = {1.0};
   expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }),
                {"1 values", "2 elements"});
-}
-
-TEST(Baseline, RefusesNothingToGoBy) {
   expect_named(input_error([] { baseline_of({}, two_elements(), 2.0); }), {"no frame"});
-  const std::vector<Frame> frames(5, Frame{.values = {nan, 1.0}});
+  frames.assign(5, {.values = {nan, 1.0}});
   expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }), {"element 0"});
 }
 
