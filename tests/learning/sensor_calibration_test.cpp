@@ -160,19 +160,4 @@ TEST(SensorCalibration, KeepsTheFirstTableUnlessAnotherIsBetterBeyondChance) {
   EXPECT_EQ(found.touches->after.log_loss, found.tried[0].log_loss);
 }
 
-TEST(SensorCalibration, TakesTheThresholdAndRatioGiven) {
-  const LetterPresses letters = three_letters(24);
-  const auto classifier = [&](std::optional<double> threshold, std::optional<double> ratio = {}) {
-    return calibrate_sensor(letters.presses, {},
-                            {.readings = {.threshold = threshold, .ratio = ratio},
-                             .tables = {{MapLayer::log_odds, 2}},
-                             .folds = 2,
-                             .bins = bins(5, 5, 6)})
-        .sensor.classifier;
-  };
-  EXPECT_EQ(classifier(1.0, 0.2).threshold, 1.0);
-  EXPECT_EQ(classifier(1.0, 0.2).ratio, 0.2);
-  EXPECT_NE(classifier(20.0).ratio, classifier(1.0).ratio) << "of touches that exceed it";
-}
-
 }  // namespace palpate::sensor_calibration_test

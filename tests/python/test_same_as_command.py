@@ -194,10 +194,6 @@ REFUSALS: dict[str, tuple[Callable[[Files], object], str, dict[str, str]]] = {
         lambda files: palpate.plan(files.unknown, files.maps, samples=1),
         "plan {0.unknown} --maps {0.maps} --candidates grid --samples 1", {},
     ),
-    "cells_of_a_map": (
-        lambda files: palpate.learn_maps(files.train[0], f"{files.folder}/new/", cell_mm=0.0),
-        "map {0.train[0]} -o {0.folder}/new/ --cell-mm 0", {},
-    ),
     "an_origin_of_unposed_touches": (
         lambda files: palpate.learn_maps(files.train[0], f"{files.folder}/new/", origin=(1, 2, 3), unposed=True),
         "map {0.train[0]} -o {0.folder}/new/ --origin 1,2,3 --unposed", {"--origin 1,2,3": "origin=(1, 2, 3)"},
@@ -210,10 +206,6 @@ REFUSALS: dict[str, tuple[Callable[[Files], object], str, dict[str, str]]] = {
     "units_of_a_table": (
         lambda _: palpate.import_tables("p.csv", array=(2, 2, 1), pose_unit="m,turn"),  # type: ignore[arg-type]
         "import p.csv --array 2:2:1 -o o.h5 --pose-unit m,turn", {"--pose-unit m,turn": "pose_unit='m,turn'"},
-    ),
-    "a_table_that_is_not_there": (
-        lambda _: palpate.import_tables(pathlib.Path("none.csv"), array=(2, 2, 1)),
-        "import none.csv --array 2:2:1 -o o.h5", {},
     ),
     "records_without_truth": (
         lambda files: palpate.evaluate(files.without_truth), "evaluate {0.without_truth}", {},
