@@ -282,21 +282,6 @@ class Import(ImportTest):
             self.put({"poses.csv": "time,x_mm,y_mm,theta_rad\n" + "".join(rows)})
             self.assertIn(said, self.said(WITH_POSES + flags))
 
-    def test_refuses_what_does_not_go_together(self) -> None:
-        for files, flags, named in (
-            ({}, "--sign 2", "palpate: --sign 2: give 1, or -1 where readings fall under load\n"),
-            ({}, "--unposed --poses poses.csv", "--unposed: poses.csv holds the poses; leave one of them out\n"),
-            ({}, "--poses poses.csv --pose-delay nan", "--pose-delay nan"),
-            ({"poses.csv": "x,y,theta\n0,0,0\n0,0,0\n0,0,0\n"}, "--poses poses.csv --pose-delay 0.1",
-             "--pose-delay 0.1: poses.csv has no times"),
-            ({"poses.csv": CASES["frames_outside_the_poses_and_in_a_gap"].files["poses.csv"]},
-             "--poses poses.csv --largest-gap-s 0.03",
-             "poses.csv: no row of log.csv finds a pose: its times are 0 to 0.1 s, the poses' are 0.01 to 0.08 s; "
-             "check clocks and units, or raise --largest-gap-s"),
-        ):  # fmt: skip
-            self.put({"poses.csv": POSES, **files})
-            self.assert_refused(self.arguments(flags), named)
-
 
 class ClocksOfLogs(ImportTest):
     """What import, touches, map and check say of logs whose clocks differ."""

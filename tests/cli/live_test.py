@@ -208,7 +208,6 @@ class Live(PreparedTest, StreamTest):
         self.assertIn(f"time runs backwards at {len(rows) // 2} of {len(rows)} frames", said)
 
     def test_of_what_cannot_be_meant_is_refused(self) -> None:
-        (self.folder / "frames.h5").rename(self.folder / "frames,1.h5")
         (self.folder / "poses.jsonl").write_text('{"time": 1, "x_mm": 0, "y_mm": 0}\n')
         array = ("--array", "6:6:1.9")
         for arguments, *named in (
@@ -216,13 +215,11 @@ class Live(PreparedTest, StreamTest):
             (live("nothing", "--poses", "-"), "nothing"),
             (live("simulate:A,colour=red"), "colour"),
             (live("replay:A.h5"), "A.h5", "rows"),
-            (live("replay:frames,1.h5,speed=max", "--json", "frames,1.h5"), "--json", "overwrite"),
             (["live", "--sensor", UNKNOWN_E], "--maps", "missing"),
             (["live", "--maps", "maps"], "--sensor"),
             (live(UNKNOWN_E, "--reset-after", "0"), "--reset-after"),
             (live(UNKNOWN_E, "--tare", "-1"), "--tare"),
             (live(UNKNOWN_E, "--gamma", "1"), "--gamma"),
-            (live(UNKNOWN_E, "--json", "maps/E.map.h5"), "--json", "E.map.h5", "overwrite"),
             (live(UNKNOWN_E, "--json", "no/such.jsonl"), "--json", "no/such.jsonl"),
             (live(UNKNOWN_E, "--poses", "poses.jsonl"), "poses.jsonl", "theta_rad"),
             (live("-"), "--array", "COLUMNS:ROWS:PITCH"),

@@ -194,16 +194,15 @@ class Recognize(PreparedTest):
         learned = "format: palpate.sensor_model\nversion: 1\nbins: {x_mm: 1, y_mm: 1, theta_rad: 0.5}\n"
         (self.folder / "s.yaml").write_text(learned)
         sensor = "simulate:A,rate=100,seed=3,touches=2,speed=max"
-        for bins, wider, command in (
-            ("20x20x15", False, ["recognize", "u.h5", "--filter=bounded"]),
-            ("10x10x15", True, ["recognize", "u.h5", "--filter=bounded"]),
-            ("10x10x15", True, ["live", "--sensor", sensor]),
-            ("10x10x15", True, ["plan", "u.h5", "--candidates", "u.h5", "--samples=16"]),
-            ("10x10x15", True, ["batch", "u.h5", "-o", "r", "--filter=histogram"]),
-            ("10x10x15", True, ["batch", "u.h5", "-o", "s", "--filter=bounded"]),
+        wide = ("--maps=maps", "--sensor-model=s.yaml", "--bins=10x10x15")
+        for command in (
+            ["recognize", "u.h5", "--filter=bounded"],
+            ["live", "--sensor", sensor],
+            ["plan", "u.h5", "--candidates", "u.h5", "--samples=16"],
+            ["batch", "u.h5", "-o", "r", "--filter=histogram"],
+            ["batch", "u.h5", "-o", "s", "--filter=bounded"],
         ):
-            said = self.palpate(*command, "--maps=maps", "--sensor-model=s.yaml", "--bins", bins).stderr
-            self.assertEqual("calibrate with --bins 10x10x15" in said, wider, f"{command}: {said}")
+            self.assertIn("calibrate with --bins 10x10x15", self.palpate(*command, *wide).stderr, command)
         into_itself = ["recognize", "u.h5", "--maps=maps", "--sensor-model=s.yaml", "--json=s.yaml"]
         self.assert_refused(into_itself, "--json s.yaml", "--sensor-model reads")
 

@@ -32,12 +32,6 @@ void expect_refused(const char* named, const std::vector<Press>& presses,
   expect_named(input_error([&] { calibrate_sensor(presses, {}, options); }), {named});
 }
 
-bool warns(const SensorCalibration& found, const std::string& part) {
-  return std::ranges::any_of(found.warnings, [&](const std::string& warning) {
-    return warning.find(part) != std::string::npos;
-  });
-}
-
 /// Presses at known or unknown poses.
 class DegeneratePresses : public testing::TestWithParam<bool> {
  protected:

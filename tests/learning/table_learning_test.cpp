@@ -126,14 +126,6 @@ TEST(TableLearning, ShrinksObjectsTowardsAllTogether) {
             table.objects.at("A"));
 }
 
-TEST(TableLearning, KeepsEquation7ForALevelThatNothingReached) {
-  const TableLearning settings{.level_edges = {1000.0}, .contact = {.prior = 0.2}};
-  LevelCounts counts(3);
-  counts.add(Reading::in_contact, 0.0, 80.0);
-  const LearnedTable table = table_of({{"A", counts}}, settings);
-  EXPECT_NEAR(std::exp(table.shared[2 * 49 + 32]), 20.0 * 0.25 / 100.0, 1e-12);
-}
-
 TEST(TableLearning, OfNoPairOfPressesIsRefused) {
   SimulatedPresses simulated;
   simulated.add_shapes(1, 5);

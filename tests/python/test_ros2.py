@@ -170,6 +170,7 @@ def stand_ins(parameters: dict[str, Any], frames: list[palpate.Frame], asked: li
 
     class Node:
         now_s = 0.0
+        create_subscription = create_service = MagicMock()
 
         def __init__(self, name: str) -> None:
             assert name == "recognise"
@@ -185,10 +186,6 @@ def stand_ins(parameters: dict[str, Any], frames: list[palpate.Frame], asked: li
                 self.published[topic].append(message)
 
             return SimpleNamespace(publish=publish)
-
-        def create_subscription(self, *_: Any) -> None: ...
-
-        def create_service(self, *_: Any) -> None: ...
 
         def get_clock(self) -> Any:
             return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(1e9 * self.now_s)))
