@@ -323,12 +323,9 @@ class ClocksOfLogs(ImportTest):
         self.assert_named(clock["words"], "t.h5: the poses' clock seems")
         self.assert_named(dropped["words"], "; the clocks differ: import with ")
         self.assertIn("ahead", self.warned(flags + " --pose-delay 0.2"))
+        self.said(flags + " --pose-delay 0.62")
+        self.assertIn("30 touches in ", self.done("touches", "o.h5", "-o", "t.h5"))
+        self.assertFalse({"clock", "dropped"} & {found["what"] for found in self.findings()})
         self.put_logs(-3600.3)
         self.assert_refused(self.arguments(WITH_POSES), "poses.csv", "finds a pose", "their offset but for 1.05 s",
                             "--pose-delay -3600.")  # fmt: skip
-
-    def test_that_agree_are_not_said(self) -> None:
-        self.put_logs(0.62)
-        self.said("--object cup --poses poses.csv --pose-delay 0.62")
-        self.assertIn("30 touches in ", self.done("touches", "o.h5", "-o", "t.h5"))
-        self.assertFalse({"clock", "dropped"} & {found["what"] for found in self.findings()})

@@ -81,9 +81,6 @@ class Recognize(PreparedTest):
         self.assertEqual(stored, printed)
         told = [(each["recording"], each["best"]) for each in stored]
         self.assertEqual(told, [("i.h5", "I"), ("u.h5", "A")])
-        alone = self.u("--none=0")
-        for key in ("mode", "identity"):
-            self.assertEqual(stored[1][key], alone[key], "the first unknown must not colour the second")
 
     def test_prints_the_tables_of_its_records(self) -> None:
         record = self.u()

@@ -119,9 +119,7 @@ TEST(SensorCalibration, LearnsTheSameGammaWhateverTheBins) {
 }
 
 TEST(SensorCalibration, OfFewTouchesAtKnownPosesSaysThatGroupsAreMissing) {
-  LetterPresses letters;
-  letters.add("A", 8, 38);
-  letters.add("U", 8, 39);
+  const LetterPresses letters = two_letters(8, 8, 38);
   const SensorCalibration found = calibrate_sensor(letters.presses, {}, {});
   EXPECT_FALSE(found.groups.has_value());
   EXPECT_EQ(found.sensor.temperature_growth, 0.0);

@@ -110,4 +110,12 @@ struct LetterPresses {
   }
 };
 
+/// Touches of an A and a U.
+inline LetterPresses two_letters(int of_a, int of_u, std::uint64_t seed) {
+  LetterPresses letters;
+  letters.add("A", of_a, seed);
+  letters.add("U", of_u, seed + 1);
+  return letters;
+}
+
 }  // namespace palpate

@@ -164,16 +164,16 @@ TEST(LevelCounts, ReadsTheLayerAtTheElementsOfAPlacedTouch) {
   layer.log_odds = {-3.0F, 5.0F};
   const std::vector<glm::dvec2> elements{{0.0, 0.0}, {1.0, 0.0}, {2.0, 0.0}, {50.0, 0.0}};
   const std::vector<double> pressure{0.0, 20.0, 40.0, 0.0};
-  const Touch touch{{}, elements, pressure};
+  const Touch touch{{{2.0, 0.0}, two_pi / 4.0}, elements, pressure};
   ContactModel model{.classifier = {.threshold = 2.0, .ratio = 0.1}};
   model.table = LikelihoodTable{.nodes = 49, .level_edges = {30.0}, .log_likelihood = {}};
   LevelCounts counts(3);
-  // The object is moved by -1 mm along x, so that elements 1 and 2 lie on the layer's cells.
-  const Pose T_object_robot{{-1.0, 0.0}, 0.0};
+  // The sensor is moved by -1 mm along x, so that elements 1 and 2 lie on the layer's cells.
+  const Pose T_object_robot{{-1.0, 2.0}, -two_pi / 4.0};
   counts.add(evidence_of(std::span(&touch, 1), model), std::span(&T_object_robot, 1), layer);
-  EXPECT_DOUBLE_EQ(counts.at(1, node_of(-3.0)), 1.0);
-  EXPECT_DOUBLE_EQ(counts.at(2, node_of(5.0)), 1.0);
-  EXPECT_DOUBLE_EQ(counts.at(0, node_of(-12.0)), 2.0) << "beyond the layer";
+  EXPECT_NEAR(counts.at(1, node_of(-3.0)), 1.0, 1e-9);
+  EXPECT_NEAR(counts.at(2, node_of(5.0)), 1.0, 1e-9);
+  EXPECT_NEAR(counts.at(0, node_of(-12.0)), 2.0, 1e-9) << "beyond the layer";
 }
 
 /// The probability of a level that a table has at a layer's value.
