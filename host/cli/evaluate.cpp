@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -52,20 +53,20 @@ std::string reliability_table(const Scores& scores) {
   return table.text();
 }
 
-std::string class_name(const ClassScores& scores) {
-  return scores.label + (scores.known ? "" : " (unknown)");
-}
-
-/// The wrong answers, the most frequent first.
+/// The wrong answers, the most frequent first: "3 A, 1 (none)".
 std::string taken_for(const ClassScores& scores, const std::vector<std::string>& answers) {
   const std::string_view right = scores.known ? std::string_view(scores.label) : none_label;
-  std::vector<std::pair<std::string, std::size_t>> wrong;
+  std::multimap<std::size_t, std::string, std::greater<>> wrong;  // [how often]
   for (std::size_t k = 0; k < answers.size(); ++k) {
     if (scores.taken[k] > 0 && answers[k] != right) {
-      wrong.emplace_back(answers[k], scores.taken[k]);
+      wrong.emplace(scores.taken[k], answers[k]);
     }
   }
-  return tally(std::move(wrong));
+  std::string text;
+  for (const auto& [count, answer] : wrong) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, answer);
+  }
+  return text;
 }
 
 std::string class_table(const Evaluation& evaluation) {
@@ -76,7 +77,7 @@ std::string class_table(const Evaluation& evaluation) {
                    {"95 % interval", true},
                    {"taken for"}});
   for (const ClassScores& scores : evaluation.classes) {
-    table.add({class_name(scores), fmt::format("{}", scores.records),
+    table.add({scores.label + (scores.known ? "" : " (unknown)"), fmt::format("{}", scores.records),
                fmt::format("{}", scores.right), percent(scores.accuracy()),
                range_words(scores.interval()), taken_for(scores, evaluation.answers)});
   }
@@ -160,8 +161,9 @@ void evaluate_results(const EvaluateArguments& options) {
   const JudgedResults results = read_results(files);
   const Evaluation evaluation = evaluate(results, options.results.front());
   std::ranges::for_each(folders, tell_missing);
-  if (const std::string failed = failed_words(results); !failed.empty()) {
-    tell_on_stderr(failed);
+  if (results.failed > 0) {
+    tell_on_stderr(count_of(results.failed, "unknown", "unknowns") +
+                   " could not be recognised, and left out; their records say why");
   }
   const std::string json = text_of(to_json(evaluation, results), 2);
   give_result(options.json, json, evaluation_text(evaluation, results.without_truth));
@@ -178,11 +180,9 @@ void add_evaluate(CLI::App& app) {
       "class, whose right answer is \"(none)\"; the area under the curve says how well unknown "
       "classes are told from known ones",
       evaluate_results);
-  command
-      ->add_option("RESULTS", options->results,
-                   "JSON files of palpate recognize, files with one such record a line, folders of "
-                   "palpate batch, or folders of *.json. Records without a true label are left out")
-      ->required();
+  add_required(*command, "RESULTS", options->results,
+               "JSON files of palpate recognize, files with one such record a line, folders of "
+               "palpate batch, or folders of *.json. Records without a true label are left out");
   command->add_option("--json", options->json, "Write all numbers as JSON; - is standard output");
 }
 

@@ -108,24 +108,6 @@ std::vector<Column> array_columns(const Recording& r) {
   return columns;
 }
 
-/// Writes a recording as CSV files from which `palpate import` makes the same recording. Numbers
-/// have as many digits as float64 needs; unknown readings and poses are empty cells, single dead
-/// readings too. The files appear when all of them are written.
-void write_tables(const std::filesystem::path& folder, const Recording& recording) {
-  if (recording.elements_mm.size() != recording.elements()) {
-    refuse(recording.path,
-           "dataset 'elements' changes from row to row, which tables cannot hold; read the file "
-           "with h5py");
-  }
-  const std::unique_ptr<AtomicFile> files[] = {
-      csv_file(folder / pressures_name, pressure_columns(recording), recording.size()),
-      csv_file(folder / array_name, array_columns(recording), recording.elements()),
-      csv_file(folder / poses_name, pose_columns(recording), recording.size())};
-  for (const auto& file : files) {
-    file->commit();
-  }
-}
-
 /// The text as one word of a shell.
 std::string shell_word(const std::string& text) {
   const bool plain = std::ranges::all_of(text, [](unsigned char c) {
@@ -158,11 +140,19 @@ std::string import_command(const std::filesystem::path& folder, const Recording&
   return command + " -o FILE.h5";
 }
 
+/// Writes a recording as CSV files from which `palpate import` makes the same recording. Numbers
+/// have as many digits as float64 needs; unknown readings and poses are empty cells, single dead
+/// readings too. The files appear when all of them are written.
 void export_tables(const ExportArguments& options) {
   if (const std::string format = read_format(options.recording); format != "palpate.recording") {
     refuse(options.recording, "format '{}' has no tables; give a recording", format);
   }
   const Recording recording = read_recording(options.recording);
+  if (recording.elements_mm.size() != recording.elements()) {
+    refuse(recording.path,
+           "dataset 'elements' changes from row to row, which tables cannot hold; read the file "
+           "with h5py");
+  }
   const std::filesystem::path folder = options.folder;
   CommandFiles files;
   files.reads("FILE", options.recording);
@@ -171,7 +161,12 @@ void export_tables(const ExportArguments& options) {
   }
   files.require_distinct();
   make_folder(folder);
-  write_tables(folder, recording);
+  for (const auto& file :
+       {csv_file(folder / pressures_name, pressure_columns(recording), recording.size()),
+        csv_file(folder / array_name, array_columns(recording), recording.elements()),
+        csv_file(folder / poses_name, pose_columns(recording), recording.size())}) {
+    file->commit();
+  }
   fmt::print("{}: {} {} of {} elements", folder.string(), recording.size(), recording.rows,
              recording.elements());
   if (!recording.sensor.empty()) {
@@ -188,12 +183,9 @@ void add_export(CLI::App& app) {
       "Write a recording as CSV tables: pressures.csv, poses.csv and array.csv. The command also "
       "prints the 'palpate import' that makes the same recording from them",
       export_tables);
-  command->add_option("FILE", options->recording, "Recording of touches or frames (HDF5)")
-      ->required();
-  command
-      ->add_option("-o,--output", options->folder,
-                   "Folder to write to; made where it is missing. Older tables are replaced")
-      ->required();
+  add_required(*command, "FILE", options->recording, "Recording of touches or frames (HDF5)");
+  add_required(*command, "-o,--output", options->folder,
+               "Folder to write to; made where it is missing. Older tables are replaced");
 }
 
 }  // namespace palpate::cli

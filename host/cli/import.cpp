@@ -90,14 +90,7 @@ void print_summary(const ImportArguments& options, const ImportedRecording& impo
   }
 }
 
-/// Tables that are read, and where their recording goes.
-struct Imported {
-  ImportArguments options;
-  ImportedRecording tables;
-};
-
-void write(const Imported& imported) {
-  const auto& [options, tables] = imported;
+void write(const ImportArguments& options, const ImportedRecording& tables) {
   write_recording(options.output, tables.recording);
   print_summary(options, tables);
   if (tables.recording.rows == "touches") {
@@ -171,7 +164,7 @@ std::vector<ImportArguments> imports_of(const ImportArguments& options) {
 
 /// All tables are read before any recording is written.
 void import_tables(const ImportArguments& options) {
-  std::vector<Imported> all;
+  std::vector<std::pair<ImportArguments, ImportedRecording>> all;
   for (const ImportArguments& one : imports_of(options)) {
     CommandFiles()
         .reads("PRESSURES", one.pressures)
@@ -179,9 +172,11 @@ void import_tables(const ImportArguments& options) {
         .reads("--array", one.array)
         .writes("-o", one.output)
         .prepare();
-    all.push_back({one, palpate::import_tables(one)});
+    all.emplace_back(one, palpate::import_tables(one));
   }
-  std::ranges::for_each(all, write);
+  for (const auto& [one, tables] : all) {
+    write(one, tables);
+  }
 }
 
 }  // namespace
@@ -193,13 +188,11 @@ void add_import(CLI::App& app) {
       "Tables are CSV files, with commas, semicolons, tabs or blanks between the cells. "
       "docs/files.md describes them",
       import_tables);
-  command
-      ->add_option("PRESSURES", options->pressures,
-                   "CSV: a row for each frame or touch, with a column for each element (and time, "
-                   "where it is known); or a row for each reading, with the columns time, element "
-                   "(counted from 0) and pressure. An empty cell or NaN is an unknown reading; an "
-                   "element without any reading is dead")
-      ->required();
+  add_required(*command, "PRESSURES", options->pressures,
+               "CSV: a row for each frame or touch, with a column for each element (and time, "
+               "where it is known); or a row for each reading, with the columns time, element "
+               "(counted from 0) and pressure. An empty cell or NaN is an unknown reading; an "
+               "element without any reading is dead");
   command->add_option("--poses", options->poses,
                       "CSV with the poses T_robot_sensor: columns x, y, theta (or yaw), or of "
                       "poses in space (see --pose-columns), and time. Frames take the pose "
@@ -210,7 +203,7 @@ void add_import(CLI::App& app) {
                     "for 'palpate map --unposed', 'palpate calibrate --unposed' and 'palpate "
                     "recognize --each-frame'; frames stay without poses");
   add_array_flags(*command, *options)->required();
-  command->add_option("-o,--output", options->output, "Recording to write (HDF5)")->required();
+  add_required(*command, "-o,--output", options->output, "Recording to write (HDF5)");
   command->add_option("--rows", options->rows,
                       "What a row of the pressures is: frames (a stream, of which 'palpate "
                       "touches' finds the touches) or touches (single presses, each with a pose or "
@@ -261,12 +254,10 @@ void add_import(CLI::App& app) {
       "--mount", options->mount,
       "X,Y,Z,ROLL,PITCH,YAW: the array's pose in the frame whose poses are logged, such as the "
       "robot's flange, mm and degrees about fixed axes [default: the poses are the array's]");
-  command
-      ->add_option(
-          "--plane", options->plane,
-          "Plane of the touches, of poses in space: auto, the robot's xy plane or the plane across "
-          "the array's mean direction; or its normal NX,NY,NZ in the robot frame")
-      ->capture_default_str();
+  add_with_default(
+      *command, "--plane", options->plane,
+      "Plane of the touches, of poses in space: auto, the robot's xy plane or the plane across "
+      "the array's mean direction; or its normal NX,NY,NZ in the robot frame");
   command->add_option(
       "--largest-gap-s", options->largest_gap_s,
       "Poses further apart in time than this are not interpolated: a frame between them has no "

@@ -20,12 +20,6 @@ namespace palpate::cli {
 
 namespace {
 
-std::string table_text(const LearnedTable& table) {
-  return fmt::format("{} levels over {}; {} object(s) with numbers of their own", table.levels(),
-                     table.layer.of == MapLayer::log_odds ? "log odds" : "mean levels",
-                     table.objects.size());
-}
-
 /// Prints a line of what a file holds.
 template <typename... Values>
 void print_row(std::string_view name, fmt::format_string<const Values&...> words,
@@ -54,7 +48,13 @@ void print_sensor_model(const std::string& path) {
     print_row("touch sd", "{:.4g} mm, {:.4g} deg", sensor.touch_sd.mm,
               degrees(sensor.touch_sd.rad));
   }
-  print_row("likelihood", "{}", sensor.table ? "table of " + table_text(*sensor.table) : "Eq. 7");
+  if (const auto& table = sensor.table) {
+    print_row("likelihood", "table of {} levels over {}; {} object(s) with numbers of their own",
+              table->levels(), table->layer.of == MapLayer::log_odds ? "log odds" : "mean levels",
+              table->objects.size());
+  } else {
+    print_row("likelihood", "Eq. 7");
+  }
   print_row("temperature", "{}",
             sensor.temperature_growth > 0.0
                 ? fmt::format("{:.4g}, and {:.4g} more for every further touch", sensor.temperature,
@@ -69,22 +69,7 @@ void print_sensor_model(const std::string& path) {
               sensor.features->objects.size());
   }
   if (const auto& scale = sensor.fit_scale) {
-    print_row(
-        "fit scale", "z of learned objects {:.4g} +- {:.4g}{}{}{}{}", scale->mean, scale->sd,
-        scale->single_touch ? fmt::format(", of a single touch where it fits best {:.4g} +- {:.4g}",
-                                          scale->single_touch->mean, scale->single_touch->sd)
-                            : "",
-        scale->stranger_sd
-            ? fmt::format(", of strangers +- {:.4g} more on it for every further touch",
-                          *scale->stranger_sd)
-            : "",
-        scale->stranger_single_touch
-            ? fmt::format(", of a single touch of strangers {:.4g} +- {:.4g} on it",
-                          scale->stranger_single_touch->mean, scale->stranger_single_touch->sd)
-            : "",
-        scale->array ? fmt::format(", by {:.0f} elements {:.3g} mm apart", scale->array->elements,
-                                   scale->array->spacing_mm)
-                     : "");
+    print_row("fit scale", "z of learned objects {:.4g} +- {:.4g}", scale->mean, scale->sd);
   }
   if (sensor.pose_scale) {
     print_row("pose scale", "covariances times {:.4g}, and {:.4g} mm of the map along each axis",
@@ -97,16 +82,12 @@ std::string closed_of(const std::string& path, const Recording& r) {
   if (r.closed) {
     return "yes";
   }
-  switch (recorder_of(path)) {
-    case Recorder::there:
-      return "no: it is being recorded";
-    case Recorder::gone:
-      return fmt::format("no: it was cut off; palpate info --close {} lets other programs open it",
-                         path);
-    case Recorder::unknown:
-      break;
-  }
-  return "no: it is being recorded, or was cut off";
+  const Recorder recorder = recorder_of(path);
+  return recorder == Recorder::there ? "no: it is being recorded"
+         : recorder == Recorder::gone
+             ? fmt::format(
+                   "no: it was cut off; palpate info --close {} lets other programs open it", path)
+             : "no: it is being recorded, or was cut off";
 }
 
 std::string range_of(const Extremes& range) {
@@ -312,10 +293,8 @@ void add_info(CLI::App& app) {
                                  "Show what a recording, a map, a posterior or a sensor model "
                                  "holds, and what is suspicious in a recording",
                                  print_info);
-  command
-      ->add_option("FILE", options->path,
-                   "Recording, map or posterior (HDF5), or sensor model (YAML)")
-      ->required();
+  add_required(*command, "FILE", options->path,
+               "Recording, map or posterior (HDF5), or sensor model (YAML)");
   command->add_flag("--close", options->close,
                     "First close a recording that was cut off, so that other programs open it too "
                     "(before, h5py needs swmr=True). This changes the file; it keeps all rows that "

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <csignal>
+#include <iterator>
 
 namespace palpate::cli {
 
@@ -9,15 +10,31 @@ namespace palpate::cli {
 /// a time.
 class Interruption {
  public:
-  Interruption();
-  ~Interruption();
+  Interruption() {
+    requested_ = 0;
+    struct sigaction action {};  // without SA_RESTART: a read that waits ends
+    action.sa_handler = [](int) { requested_ = 1; };
+    for (std::size_t i = 0; i < std::size(signals); ++i) {
+      ::sigaction(signals[i], &action, &before_[i]);
+      if (before_[i].sa_handler == SIG_IGN) {
+        ::sigaction(signals[i], &before_[i], nullptr);  // nohup wants SIGHUP ignored
+      }
+    }
+  }
+  ~Interruption() {
+    for (std::size_t i = 0; i < std::size(signals); ++i) {
+      ::sigaction(signals[i], &before_[i], nullptr);
+    }
+  }
   Interruption(const Interruption&) = delete;
   Interruption& operator=(const Interruption&) = delete;
 
-  bool requested() const;
+  bool requested() const { return requested_ != 0; }
 
  private:
-  struct sigaction before_[3];
+  static constexpr int signals[] = {SIGINT, SIGHUP, SIGTERM};
+  static inline volatile std::sig_atomic_t requested_ = 0;
+  struct sigaction before_[std::size(signals)];
 };
 
 }  // namespace palpate::cli

@@ -43,35 +43,6 @@ struct LiveArguments : SensorArguments {
   PageAddress page;
 };
 
-/// Tells on standard error, as it happens, what is wrong with the poses, the lattice or the sensor.
-class Findings {
- public:
-  void add(const std::string& finding) {
-    const std::lock_guard lock(mutex_);
-    last_ = finding;
-    tell_on_stderr(finding);
-  }
-  std::string last() const {
-    const std::lock_guard lock(mutex_);
-    return last_;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::string last_;
-};
-
-/// Tells on standard error what has changed of the sensor that a person has to act on.
-void tell_change(const LiveState& before, const LiveState& now) {
-  if (now.taring && !before.taring) {
-    tell_on_stderr("taring: do not touch the array");
-  }
-  if (now.gone != before.gone) {
-    tell_on_stderr(now.gone ? "the board is unplugged; plug it in again to go on"
-                            : "the board is back");
-  }
-}
-
 /// A file to which lines are added; other programs can read each line at once.
 class LineFile {
  public:
@@ -151,9 +122,15 @@ void live(const LiveArguments& options) {
            "robot's poses",
            options.sensor);
   }
-  Findings findings;
-  const OpenSensor opened =
-      open_sensor(options, [&findings](const std::string& finding) { findings.add(finding); });
+  // What is wrong with the poses, the lattice or the sensor, as it happens.
+  std::mutex mutex;
+  std::string last_finding;
+  const auto tell = [&](const std::string& finding) {
+    const std::lock_guard lock(mutex);
+    last_finding = finding;
+    tell_on_stderr(finding);
+  };
+  const OpenSensor opened = open_sensor(options, tell);
   const SensorDescription& description = opened.sensor->description();
   std::vector<glm::dvec2> elements_mm = description.elements_mm;
   const std::string source = "sensor " + options.sensor;
@@ -189,16 +166,17 @@ void live(const LiveArguments& options) {
   const Interruption interruption;
   const bool to_program = options.json == "-";
   std::FILE* const people = to_program ? stderr : stdout;
+  const auto show = [people](const std::string& text) {
+    fmt::print(people, "{}", text);
+    std::fflush(people);
+  };
   std::optional<LivePage> page;
   if (options.page.port) {
     page.emplace(options.page, description, elements_mm, task, recogniser, goal);
-    fmt::print(people, "{}\n", page->words());
-    std::fflush(people);
+    show(page->words() + "\n");
   }
-  const LiveTable table(task);
   if (!to_program) {
-    fmt::print("{}", table.heading());
-    std::fflush(stdout);
+    show(live_heading(task));
   }
   bool resolved = true;  // nothing was said yet
   LiveOptions settings{.detector = detector,
@@ -213,8 +191,7 @@ void live(const LiveArguments& options) {
       page->plan(touch);
     }
     if (!to_program) {
-      fmt::print("         {}\n", next_touch_words(*touch.next, *goal));
-      std::fflush(stdout);
+      show("         " + next_touch_words(*touch.next, *goal) + "\n");
     }
   };
   settings.on_unknown = [&] {
@@ -227,7 +204,7 @@ void live(const LiveArguments& options) {
     const std::string unresolved = recogniser.unresolved_words();
     if (resolved && !unresolved.empty()) {
       resolved = false;
-      findings.add(unresolved);
+      tell(unresolved);
     }
     if (json) {
       json->add(text_of(to_json(touch, task)));
@@ -236,8 +213,7 @@ void live(const LiveArguments& options) {
       page->add(touch);
     }
     if (!to_program) {
-      fmt::print("{}", table.line(touch));
-      std::fflush(stdout);
+      show(live_line(touch, task));
     }
   };
   LiveRecognition recognition(*opened.sensor, elements_mm, recogniser, task, settings, on_touch);
@@ -254,9 +230,16 @@ void live(const LiveArguments& options) {
       std::this_thread::sleep_for(40ms);
     }
     const LiveState before = std::exchange(state, recognition.state());
-    tell_change(before, state);
+    if (state.taring && !before.taring) {
+      tell_on_stderr("taring: do not touch the array");
+    }
+    if (state.gone != before.gone) {
+      tell_on_stderr(state.gone ? "the board is unplugged; plug it in again to go on"
+                                : "the board is back");
+    }
     if (page) {
-      page->update(state, findings.last());
+      const std::lock_guard lock(mutex);
+      page->update(state, last_finding);
     }
   }
   if (page) {
@@ -270,9 +253,9 @@ void live(const LiveArguments& options) {
     refuse(source, "none of its {} touches has a pose; give --poses{}", state.without_pose,
            opened.lines != nullptr ? ", or x_mm, y_mm and theta_rad in its lines" : "");
   }
-  fmt::print(people, "{}", summary(state, recognition.latencies_ms(), task));
+  show(summary(state, recognition.latencies_ms(), task));
   if (!to_program) {
-    fmt::print("{}\n", setup_words(job));
+    show(setup_words(job) + "\n");
   }
   report_refused(opened);
 }
@@ -290,11 +273,9 @@ void add_live(CLI::App& app) {
                    " [default: the poses of the replay, of the simulation or of the lines]");
   add_recognition_flags(*command, options->request, options->verbose);
   add_detector_flags(*command, options->detector, "10; 0: the rest stays the baseline");
-  command
-      ->add_option("--tare", options->tare_s,
+  add_with_default(*command, "--tare", options->tare_s,
                    "Seconds at the start in which nothing may touch the array and its baseline is "
-                   "read, unless the sensor knows the baseline; 0: no baseline")
-      ->capture_default_str();
+                   "read, unless the sensor knows the baseline; 0: no baseline");
   command->add_option("--reset-after", options->reset_after_s,
                       "Seconds without contact after which the next touch is of another unknown "
                       "object [default: never]");

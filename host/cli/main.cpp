@@ -170,12 +170,6 @@ int complain_of_output() {
                   "standard output: cannot be written; free disk space, or read it to its end");
 }
 
-int complain_of_memory() {
-  return complain(
-      failed,
-      "out of memory; end other programs, or use smaller files, fewer bins, objects or cells");
-}
-
 /// The exit status after a command has succeeded: 0, or 1 where a part of its output was lost.
 int finish() {
   return std::fflush(stdout) != 0 || std::ferror(stdout) != 0 ? complain_of_output() : 0;
@@ -220,23 +214,21 @@ int run(int argc, char** argv) {
       return finish();
     }
     const auto commands = app.get_subcommands();
-    const CLI::App* command = commands.empty() ? nullptr : commands.front();
+    const std::string command = commands.empty() ? "" : commands.front()->get_name();
+    const std::string see =
+        fmt::format("; see palpate {}{}--help", command, command.empty() ? "" : " ");
     const auto unexpected = app.remaining(true);
     const bool unknown = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
     const bool flag = !unexpected.empty() && unexpected.front().starts_with('-');
-    if (!unexpected.empty() && (command == nullptr || unknown || flag)) {
-      const std::string& typed = unexpected.front();
-      return complain(wrong_input,
-                      fmt::format("'{}' is {}; see palpate {}--help", typed,
-                                  command == nullptr ? "no command or flag"
-                                  : flag             ? "no flag of palpate " + command->get_name()
-                                                     : "one argument too many",
-                                  command == nullptr ? "" : command->get_name() + " "));
+    if (!unexpected.empty() && (command.empty() || unknown || flag)) {
+      return complain(wrong_input, fmt::format("'{}' is {}{}", unexpected.front(),
+                                               command.empty() ? "no command or flag"
+                                               : flag          ? "no flag of palpate " + command
+                                                               : "one argument too many",
+                                               see));
     }
     const bool number = error.get_name() == "ConversionError";  // all values but texts are numbers
-    return complain(wrong_input, fmt::format("{}{}; see palpate {}--help", error.what(),
-                                             number ? ": give a number" : "",
-                                             command == nullptr ? "" : command->get_name() + " "));
+    return complain(wrong_input, error.what() + std::string(number ? ": give a number" : "") + see);
   }
   const int finished = finish();
   return finished != 0 ? finished : status;
@@ -252,11 +244,13 @@ int run_supervised(int argc, char** argv) {
     return run(argc, argv);
   } catch (const Error& error) {
     return complain(error.fault() == Fault::input ? wrong_input : failed, error.what());
-  } catch (const std::bad_alloc&) {
-    return complain_of_memory();
-  } catch (const std::length_error&) {  // more than any memory
-    return complain_of_memory();
   } catch (const std::exception& error) {
+    if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
+        dynamic_cast<const std::length_error*>(&error) != nullptr) {  // more than any memory
+      return complain(
+          failed,
+          "out of memory; end other programs, or use smaller files, fewer bins, objects or cells");
+    }
     // fmt::print throws where standard output cannot be written, without naming it.
     return std::ferror(stdout) != 0 ? complain_of_output() : complain(failed, error.what());
   }

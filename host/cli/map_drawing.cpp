@@ -12,7 +12,7 @@
 #include "cli/options.hpp"
 #include "io/drawing_file.hpp"
 #include "model/printable.hpp"
-#include "streaming/import_array.hpp"
+#include "streaming/import_steps.hpp"
 
 namespace palpate::cli {
 

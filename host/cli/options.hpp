@@ -26,6 +26,17 @@ std::pair<CLI::App*, Arguments*> add_command(CLI::App& app, const char* name, co
   return {command, arguments.get()};
 }
 
+/// An option that must be given.
+template <typename Value>
+CLI::Option* add_required(CLI::App& command, const char* name, Value& value, const char* help) {
+  return command.add_option(name, value, help)->required();
+}
+/// An option whose help shows its default.
+template <typename Value>
+CLI::Option* add_with_default(CLI::App& command, const char* name, Value& value, const char* help) {
+  return command.add_option(name, value, help)->capture_default_str();
+}
+
 /// Says a sentence to the user, on standard error, its options as flags.
 void tell_on_stderr(const std::string& sentence);
 

@@ -108,36 +108,27 @@ void add_plan(CLI::App& app) {
       "of a recording: the mutual information between the touch's readings and the object and its "
       "pose. Prints the ten best poses T_robot_sensor, in the robot frame",
       plan_touches);
-  command->add_option("RECORDING", options->recording, "Recording of the touches so far (HDF5)")
-      ->required();
+  add_required(*command, "RECORDING", options->recording, "Recording of the touches so far (HDF5)");
   add_recognition_flags(*command, options->request, options->verbose);
   // Out of the help, as the plan needs bins; read still, to be refused with the reason.
   for (const char* flag : {"--particles", "--resampling", "--augmented", "--seed"}) {
     command->get_option(flag)->group("");
   }
-  command
-      ->add_option("--candidates", options->candidates,
-                   "Sensor poses T_robot_sensor to choose from: a CSV file with the columns x, y "
-                   "and theta (or yaw; in mm and rad, or as the names say: x_m, theta_deg), the "
-                   "touches of a recording (.h5), or grid: 100 to 300 poses about the places where "
-                   "the object may be, half an array apart, at four angles")
-      ->required();
-  command
-      ->add_option("--goal", options->goal,
-                   "What the touch shall tell: identity, pose (once the object is known) or both")
-      ->capture_default_str();
+  add_required(*command, "--candidates", options->candidates,
+               "Sensor poses T_robot_sensor to choose from: a CSV file with the columns x, y "
+               "and theta (or yaw; in mm and rad, or as the names say: x_m, theta_deg), the "
+               "touches of a recording (.h5), or grid: 100 to 300 poses about the places where "
+               "the object may be, half an array apart, at four angles");
+  add_with_default(*command, "--goal", options->goal,
+                   "What the touch shall tell: identity, pose (once the object is known) or both");
   add_option_flag(*command, options->request, "frames");
   add_option_flag(*command, options->request, "touches");
-  command
-      ->add_option("--samples", options->samples,
+  add_with_default(*command, "--samples", options->samples,
                    "Objects and poses that stand for the belief; the time grows with its square")
-      ->check(require_whole_number)
-      ->capture_default_str();
-  command
-      ->add_option("--plan-seed", options->seed,
+      ->check(require_whole_number);
+  add_with_default(*command, "--plan-seed", options->seed,
                    "Seed of the samples and of the readings that they simulate")
-      ->check(require_whole_number)
-      ->capture_default_str();
+      ->check(require_whole_number);
   command->add_option(
       "--json", options->json,
       "Write what is believed and all candidates, the best first, as JSON; - is standard output");

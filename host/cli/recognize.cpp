@@ -14,7 +14,6 @@
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/record_table.hpp"
-#include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "io/atomic_file.hpp"
 #include "palpate/files.hpp"
@@ -199,8 +198,7 @@ void add_recognize(CLI::App& app) {
       "frame, T_robot_object: p_robot = R(theta) p_object + (x, y), with one standard deviation. "
       "The JSON file has T_object_robot as well",
       recognize);
-  command->add_option("RECORDING", options->recordings, "Recordings of unknown objects (HDF5)")
-      ->required();
+  add_required(*command, "RECORDING", options->recordings, "Recordings of unknown objects (HDF5)");
   add_recognition_flags(*command, options->request, options->verbose);
   add_selection_flags(*command, options->request);
   command->add_option("--json", options->json, "Write the records as JSON; - is standard output");

@@ -1,6 +1,7 @@
 #include <chrono>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -13,9 +14,9 @@
 #include "cli/sensor_option.hpp"
 #include "model/printable.hpp"
 #include "model/stream_time.hpp"
-#include "palpate/baseline.hpp"
 #include "palpate/error.hpp"
 #include "palpate/frame_recorder.hpp"
+#include "palpate/sensor.hpp"
 #include "palpate/touch_detector.hpp"
 #include "palpate/virtual_sensor.hpp"
 
@@ -35,101 +36,83 @@ struct RecordArguments : SensorArguments {
 
 /// Records the sensor's frames until --seconds are over, the sensor ends or a signal interrupts.
 /// Those of the tare wait in memory until the baseline is known, so that a tare that fails leaves
-/// an older file as it is.
-class FrameRecording {
- public:
-  /// @param tare_s duration of the tare in seconds; 0: the sensor knows its baseline, or has none
-  FrameRecording(const std::string& output, SensorDescription sensor, double tare_s)
-      : output_(output), sensor_(std::move(sensor)), tare_s_(tare_s) {
-    if (tare_s_ == 0.0) {
-      recorder_.emplace(output_, sensor_);
+/// an older file as it is. Returns the frames and seconds in words. Throws Error where no frame was
+/// recorded or the array was touched during the tare; no recording is left then.
+std::string record_frames(Sensor& sensor, SensorDescription description,
+                          const RecordArguments& options) {
+  const Interruption interruption;
+  const bool tared = description.baseline.empty() && options.tare_s > 0.0;
+  std::vector<Frame> of_tare;
+  std::optional<FrameRecorder> recorder;  // once the baseline is known
+  const auto begin = [&] {
+    if (tared) {
+      const bool raw = description.pressure_unit == "raw";
+      description.baseline = baseline_of(
+          of_tare, description, raw ? std::nullopt : std::optional(TouchDetectorOptions{}.onset));
     }
+    recorder.emplace(options.output, description);
+    for (const Frame& frame : std::exchange(of_tare, {})) {
+      recorder->add(frame);
+    }
+  };
+  if (!tared) {
+    begin();
   }
-
-  void record(Sensor& sensor, std::optional<double> seconds, const Interruption& interruption) {
-    StreamTime time;
-    Clock::time_point heard = Clock::now();
-    while (!interruption.requested()) {
-      if (const std::optional<Frame> frame = sensor.next(100ms)) {
-        heard = Clock::now();
-        const double elapsed_s = time.advance(frame->host_time_s);
-        if (seconds && elapsed_s >= *seconds) {
-          break;
-        }
-        add(*frame, elapsed_s);
-        continue;
-      }
-      // A silent board ends too, after --seconds, or a script would wait forever.
-      const std::chrono::duration<double> silent_s = Clock::now() - heard;
-      if (sensor.ended() || (seconds && silent_s.count() > *seconds)) {
+  sensor.start();
+  StreamTime time;
+  double elapsed_s = 0.0;  // at the last frame that was recorded
+  for (Clock::time_point heard = Clock::now(); !interruption.requested();) {
+    if (const std::optional<Frame> frame = sensor.next(100ms)) {
+      heard = Clock::now();
+      const double now_s = time.advance(frame->host_time_s);
+      if (options.seconds && now_s >= *options.seconds) {
         break;
       }
-      if (recorder_) {
-        recorder_->flush();
+      elapsed_s = now_s;
+      if (recorder) {
+        recorder->add(*frame);
+        continue;
       }
+      of_tare.push_back(*frame);
+      if (elapsed_s >= options.tare_s) {
+        begin();
+      }
+      continue;
+    }
+    // A silent board ends too, after --seconds, or a script would wait forever.
+    const std::chrono::duration<double> silent_s = Clock::now() - heard;
+    if (sensor.ended() || (options.seconds && silent_s.count() > *options.seconds)) {
+      break;
+    }
+    if (recorder) {
+      recorder->flush();
     }
   }
-
-  /// Closes the file, and returns its frames and seconds in words. Throws Error where no frame was
-  /// recorded or the array was touched during the tare; no recording is left then.
-  std::string close(const std::string& sensor) {
-    if (!recorder_ && !of_tare_.empty()) {
-      end_tare();
-    }
-    const std::uint64_t frames = recorder_ ? recorder_->frames() : 0;
-    if (frames + (recorder_ ? recorder_->unreadable() : 0) == 0) {
-      throw Error(Fault::system,
-                  fmt::format("sensor {}: no frame came; see palpate sensors", sensor));
-    }
-    if (frames == 0) {
-      refuse("sensor " + sensor,
-             "none of its {} frames has both a known reading and a time; check the board and its "
-             "connection with palpate sensors",
-             recorder_->unreadable());
-    }
-    recorder_->close();
-    return fmt::format(
-        "{} frames in {:.3f} s{}, {} lost, {} with a pose{}", frames, elapsed_s_,
-        frames > 1 && elapsed_s_ > 0.0
-            ? fmt::format(", {:.1f} Hz", static_cast<double>(frames - 1) / elapsed_s_)
-            : "",
-        recorder_->lost(), recorder_->with_pose(),
-        recorder_->unknown_readings() > 0
-            ? fmt::format(", {} readings unknown", recorder_->unknown_readings())
-            : "");
+  sensor.stop();
+  if (!recorder && !of_tare.empty()) {
+    begin();
   }
-
- private:
-  void add(const Frame& frame, double elapsed_s) {
-    elapsed_s_ = elapsed_s;
-    if (recorder_) {
-      recorder_->add(frame);
-      return;
-    }
-    of_tare_.push_back(frame);
-    if (elapsed_s_ >= tare_s_) {
-      end_tare();
-    }
+  const std::uint64_t frames = recorder ? recorder->frames() : 0;
+  if (frames + (recorder ? recorder->unreadable() : 0) == 0) {
+    throw Error(Fault::system,
+                fmt::format("sensor {}: no frame came; see palpate sensors", options.sensor));
   }
-
-  void end_tare() {
-    const bool raw = sensor_.pressure_unit == "raw";
-    sensor_.baseline = baseline_of(
-        of_tare_, sensor_, raw ? std::nullopt : std::optional(TouchDetectorOptions{}.onset));
-    recorder_.emplace(output_, sensor_);
-    for (const Frame& frame : of_tare_) {
-      recorder_->add(frame);
-    }
-    of_tare_ = {};
+  if (frames == 0) {
+    refuse("sensor " + options.sensor,
+           "none of its {} frames has both a known reading and a time; check the board and its "
+           "connection with palpate sensors",
+           recorder->unreadable());
   }
-
-  std::string output_;
-  SensorDescription sensor_;
-  double tare_s_;
-  std::vector<Frame> of_tare_;
-  double elapsed_s_ = 0.0;                 ///< at the last frame that was recorded
-  std::optional<FrameRecorder> recorder_;  ///< once the baseline is known
-};
+  recorder->close();
+  return fmt::format("{} frames in {:.3f} s{}, {} lost, {} with a pose{}", frames, elapsed_s,
+                     frames > 1 && elapsed_s > 0.0
+                         ? fmt::format(", {:.1f} Hz", static_cast<double>(frames - 1) / elapsed_s)
+                         : "",
+                     recorder->lost(), recorder->with_pose(),
+                     recorder->unknown_readings() > 0
+                         ? fmt::format(", {} readings unknown", recorder->unknown_readings())
+                         : "");
+}
 
 void record(const RecordArguments& options) {
   CommandFiles files;
@@ -139,8 +122,8 @@ void record(const RecordArguments& options) {
     require_above("--seconds", *options.seconds, 0.0);
   } else if (is_endless_flood(options.sensor)) {
     refuse("sensor " + options.sensor,
-           "the simulation has no end and gives more than 10 MB/s, which would fill the disk; give "
-           "--seconds, touches=N, or a lower rate or speed");
+           "the simulation has no end and gives frames as fast as they are taken, which would fill "
+           "the disk; give --seconds, touches=N, or a speed");
   }
   require_above("--tare", options.tare_s, 0.0, true);
   if (!is_printable(options.object)) {
@@ -152,14 +135,7 @@ void record(const RecordArguments& options) {
   if (!options.object.empty()) {
     description.object = options.object;
   }
-
-  const Interruption interruption;
-  FrameRecording recording(options.output, description,
-                           description.baseline.empty() ? options.tare_s : 0.0);
-  sensor.start();
-  recording.record(sensor, options.seconds, interruption);
-  sensor.stop();
-  fmt::print("{}: {}\n", options.output, recording.close(options.sensor));
+  fmt::print("{}: {}\n", options.output, record_frames(sensor, description, options));
   report_refused(opened);
 }
 
@@ -173,19 +149,15 @@ void add_record(CLI::App& app) {
                                    "a full disk costs at most the last second of the recording",
                                    record);
   add_sensor_flags(*command, *options, "");
-  command
-      ->add_option("-o,--output", options->output,
-                   "Recording of frames to write (HDF5); replaces an older file")
-      ->required();
+  add_required(*command, "-o,--output", options->output,
+               "Recording of frames to write (HDF5); replaces an older file");
   command->add_option("--seconds", options->seconds,
                       "Stop after this time, s [default: at Ctrl-C]. Required for a simulation of "
                       "more than 10 MB/s without touches=N");
-  command
-      ->add_option("--tare", options->tare_s,
+  add_with_default(*command, "--tare", options->tare_s,
                    "Duration of the tare at the start, s: nothing may touch the array, and the "
                    "median of its frames becomes the baseline. If it is touched, or an element has "
-                   "no known reading, nothing is recorded and an older file stays. 0: no tare")
-      ->capture_default_str();
+                   "no known reading, nothing is recorded and an older file stays. 0: no tare");
   command->add_option("--object", options->object, "Label of the touched object");
 }
 

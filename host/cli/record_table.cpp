@@ -1,15 +1,19 @@
 #include "cli/record_table.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <numeric>
+#include <set>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "cli/step_words.hpp"
+#include "cli/text_table.hpp"
 #include "model/printable.hpp"
 #include "recognition/record_json.hpp"
 
@@ -73,35 +77,13 @@ TextTable::Row step_cells(TextTable::Row first, const RecognitionStep& step,
   return first;
 }
 
-std::string printable_name(const RecognitionRecord& record) { return printable(name_of(record)); }
-
-/// What the labels that were not always right were taken for, most often first.
-std::string confusions(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
-  struct Answers {
-    std::size_t all = 0;
-    std::size_t right = 0;
-    std::map<std::string, std::size_t> wrong;
-  };
-  std::map<std::string, Answers> answers_of;  // [true label]
-  bool all_right = true;
-  for (const RecognitionRecord& record : records) {
-    if (const auto right = record.last().right) {
-      Answers& answers = answers_of[record.true_label];
-      ++answers.all;
-      ++(*right ? answers.right : answers.wrong[task.labels[record.last().best]]);
-      all_right = all_right && *right;
-    }
-  }
-  if (all_right) {
-    return "";
-  }
-  TextTable table({{"object"}, {"right", true}, {"taken for"}});
-  for (const auto& [label, answers] : answers_of) {
-    table.add({label, fmt::format("{} of {}", answers.right, answers.all),
-               tally({answers.wrong.begin(), answers.wrong.end()})});
-  }
-  return "\n" + table.text();
+TextTable live_table(const RecognitionTask& task) {
+  return TextTable(step_columns({{"unknown", true, 7}, {"touch", true, 5}},
+                                {"latency ms", true, 10},
+                                traits_of(task.filter).certificate ? 7 : 0));
 }
+
+std::string printable_name(const RecognitionRecord& record) { return printable(name_of(record)); }
 
 /// Of more unknowns a line each would hide the table, where a column says on which to act.
 constexpr std::size_t few_decided = 3;
@@ -158,29 +140,22 @@ std::string summary(const std::vector<RecognitionRecord>& records) {
   return text + "\n";
 }
 
-/// Within which angles theta of symmetric objects is given, once for each label.
+/// Within which angles theta of symmetric objects is given, once for each label. Touches may tell
+/// the turns of a map that looks alike apart.
 std::string symmetries(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
-  std::map<std::string, std::map<int, int>> records_of;  // [label, symmetry]
+  std::set<std::pair<std::string, int>> symmetric;  // label, n
   for (const RecognitionRecord& record : records) {
     const RecognitionStep& step = record.last();
-    ++records_of[task.labels[task.label_of[step.mode.object]]][step.symmetry];
+    if (step.symmetry != 1) {
+      symmetric.emplace(task.labels[task.label_of[step.mode.object]], step.symmetry);
+    }
   }
   std::string text;
-  for (const auto& [label, counts] : records_of) {
-    for (const auto& [n, count] : counts) {
-      if (n == 1) {
-        continue;
-      }
-      // Touches may tell the turns of a map that looks alike apart.
-      const std::string whose =
-          counts.size() == 1
-              ? ": its"
-              : fmt::format(", as far as the touches of {} of these unknowns tell: their", count);
-      text += fmt::format(
-          "{} looks the same after {}{} theta is given {}\n", printable(label),
-          n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n), whose,
-          n == 0 ? "as 0" : fmt::format("from {:.4g} to {:.4g} deg", -180.0 / n, 180.0 / n));
-    }
+  for (const auto& [label, n] : symmetric) {
+    text += fmt::format(
+        "{} looks the same after {}: its theta is given {}\n", printable(label),
+        n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
+        n == 0 ? "as 0" : fmt::format("from {:.4g} to {:.4g} deg", -180.0 / n, 180.0 / n));
   }
   return text;
 }
@@ -259,11 +234,13 @@ std::string result_table(const std::vector<RecognitionRecord>& records,
                    {fmt::format("{}{}{}", with_fit ? "fit" : "", with_fit && with_error ? ", " : "",
                                 with_error ? "error" : ""),
                     false}});
-  const auto add = [&table](const char* what, const std::string& label,
-                            std::optional<double> probability, const Pose& T_robot_object,
-                            const StandardDeviations& sd, const std::string& last) {
-    const auto [x, y, theta] = pose_cells(T_robot_object, sd);
-    table.add({what, "", "", label, share_text(probability), "", x, y, theta, last});
+  using Row = TextTable::Row;
+  const auto line = [](const std::string& what, const std::string& label,
+                       std::optional<double> probability, const std::optional<Pose>& T_robot_object,
+                       const StandardDeviations& sd, const std::string& last) -> Row {
+    const auto [x, y, theta] =
+        T_robot_object ? pose_cells(*T_robot_object, sd) : std::array<std::string, 3>{};
+    return {what, "", "", label, share_text(probability), "", x, y, theta, last};
   };
   const auto off = [](std::optional<double> error_mm) {
     return error_mm ? fmt::format("{:.2f} mm off", *error_mm) : "";
@@ -271,57 +248,50 @@ std::string result_table(const std::vector<RecognitionRecord>& records,
   for (const RecognitionRecord& record : records) {
     const RecognitionStep& step = record.last();
     const std::string posed = task.name_of(step.mode.object);
-    TextTable::Row row{name_of(record),
-                       fmt::format("{}", record.touches),
-                       !with_act           ? ""
-                       : step.decision.act ? "act"
-                                           : "-",
-                       printable(is_of_best(step, task) ? posed : task.labels[step.best]),
-                       share_text(step.confidence()),
-                       dropped_text(step)};
-    if (const auto share = share_at_pose(step, task)) {  // less than that of the best label
-      row.resize(10);
-      table.add(row);
-      add("  pose", posed, share, step.T_robot_object(), sd_at_peak(step), fit_words(step));
-    } else {
-      const auto [x, y, theta] = pose_cells(step.T_robot_object(), sd_at_peak(step));
-      row.insert(row.end(), {x, y, theta, fit_words(step)});
-      table.add(row);
+    const std::optional<double> share = share_at_pose(step, task);  // less than the best label's
+    const std::optional<Pose> pose = step.T_robot_object();
+    Row row = line(name_of(record), is_of_best(step, task) ? posed : task.labels[step.best],
+                   step.confidence(), share ? std::nullopt : pose, sd_at_peak(step),
+                   share ? "" : fit_words(step));
+    row[1] = fmt::format("{}", record.touches);
+    row[2] = !with_act ? "" : step.decision.act ? "act" : "-";
+    row[5] = dropped_text(step);
+    table.add(row);
+    if (share) {
+      table.add(line("  pose", posed, share, pose, sd_at_peak(step), fit_words(step)));
     }
     for (const BeliefMode& mode : other_modes(step)) {
-      add("  or", task.name_of(mode.object), mode.probability, mode.pose.T_robot_object,
-          mode.pose.sd(), "");
+      table.add(line("  or", task.name_of(mode.object), mode.probability, mode.pose.T_robot_object,
+                     mode.pose.sd(), ""));
     }
     if (const double none = none_probability(step, task); none >= 0.01) {
-      table.add({"  or", "", "", std::string(none_label), share_text(none), "", "", "", "", ""});
+      table.add(line("  or", std::string(none_label), none, {}, {}, ""));
     }
     if (step.refined) {
-      add("  mode", posed, {}, step.mode_T_robot_object(), {}, off(step.error_mm));
+      table.add(line("  mode", posed, {}, step.mode_T_robot_object(), {}, off(step.error_mm)));
     }
     if (const std::optional<Pose> truth = step.true_T_robot_object()) {
-      add("  truth", step.truth.label, {}, *truth, {}, off(step.pose_error_mm()));
+      table.add(line("  truth", step.truth.label, {}, truth, {}, off(step.pose_error_mm())));
     } else if (step.right == false) {
-      table.add({"  truth", "", "", step.truth.label, "", "", "", "", "", "wrong object"});
+      table.add(line("  truth", step.truth.label, {}, {}, {}, "wrong object"));
     }
   }
   return decisions(records, task) + table.text() + findings(records, task) +
-         symmetries(records, task) + summary(records) + confusions(records, task);
+         symmetries(records, task) + summary(records);
 }
 
-LiveTable::LiveTable(const RecognitionTask& task)
-    : task_(task),
-      table_(step_columns({{"unknown", true, 7}, {"touch", true, 5}}, {"latency ms", true, 10},
-                          traits_of(task.filter).certificate ? 7 : 0)) {}
+std::string live_heading(const RecognitionTask& task) {
+  const TextTable table = live_table(task);
+  return table.line(table.headings());
+}
 
-std::string LiveTable::heading() const { return table_.line(table_.headings()); }
-
-std::string LiveTable::line(const LiveTouch& touch) const {
+std::string live_line(const LiveTouch& touch, const RecognitionTask& task) {
   TextTable::Row row =
       step_cells({fmt::format("{}", touch.unknown + 1), fmt::format("{}", touch.index + 1)},
-                 touch.step, task_, fmt::format("{:.2f}", touch.latency_ms));
+                 touch.step, task, fmt::format("{:.2f}", touch.latency_ms));
   std::ranges::replace(row, std::string(), "-");
   row.back() += touch.step.decision.act ? ", act" : "";  // "fit" is last
-  return table_.line(row);
+  return live_table(task).line(row);
 }
 
 std::string summary(const LiveState& state, std::vector<double> latencies_ms,

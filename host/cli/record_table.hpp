@@ -3,13 +3,13 @@
 #include <string>
 #include <vector>
 
-#include "cli/text_table.hpp"
+#include "figures/figures.hpp"
 #include "recognition/live_recognition.hpp"
 #include "recognition/recognition_record.hpp"
 
 namespace palpate::cli {
 
-// What people read of records, and of each touch of a stream.
+// What people read of records, and of each touch of a stream: tables and pictures.
 
 /// Dropped mass of a bounded posterior, rounded up to one digit: "3e-07"; "" without a certificate.
 std::string dropped_text(const RecognitionStep& step);
@@ -27,22 +27,21 @@ std::string findings(const std::vector<RecognitionRecord>& records, const Recogn
 /// each unknown a line with its pose in the robot frame, below it a line for each other mode with
 /// at least 5 % of the belief, one with the mode where the pose is between the bins, and a line
 /// with the truth where it is known. Then what is wrong with which unknown and, where truths are
-/// known, how many are right, the mean pose errors and what each wrongly recognised label was taken
-/// for.
+/// known, how many are right and the mean pose errors.
 std::string result_table(const std::vector<RecognitionRecord>& records,
                          const RecognitionTask& task);
 
-/// A table for people, whose lines are printed as touches come.
-class LiveTable {
- public:
-  explicit LiveTable(const RecognitionTask& task);
-  std::string heading() const;
-  std::string line(const LiveTouch& touch) const;
+/// Where one object's belief lies; a single empty cell where it has none.
+PlacedBelief belief_of(const Recogniser& recogniser, int object);
 
- private:
-  const RecognitionTask& task_;
-  TextTable table_;
-};
+/// The picture of one recognised unknown: its result in words, its touches, its trace.
+/// @param belief of the object of the last step's mode
+RecognitionSheet sheet_of(const RecognitionRecord& record, const Query& unknown,
+                          const RecognitionTask& task, PlacedBelief belief);
+
+// A table for people, whose lines are printed as touches come.
+std::string live_heading(const RecognitionTask& task);
+std::string live_line(const LiveTouch& touch, const RecognitionTask& task);
 
 /// The whole stream in a few lines.
 std::string summary(const LiveState& state, std::vector<double> latencies_ms,

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
-#include <fstream>
-#include <iterator>
 #include <string_view>
 #include <system_error>
 
@@ -19,22 +17,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string numbered(std::size_t index, const char* suffix) {
-  return fmt::format("{:06}{}", index, suffix);
-}
-
 /// What the folder holds; nothing where there is no such folder.
-std::vector<fs::path> paths_in(const fs::path& folder) {
-  std::error_code error;
-  std::vector<fs::path> paths;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    paths.push_back(entry.path());
-  }
-  if (error && error != std::errc::no_such_file_or_directory &&
-      error != std::errc::not_a_directory) {
-    refuse(folder, "cannot be read: {}; check its permissions", error.message());
-  }
-  return paths;
+std::vector<fs::path> known_paths_in(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::is_directory(folder, ignored) ? paths_in(folder) : std::vector<fs::path>();
 }
 
 /// Whether a process that was killed has left this half-written.
@@ -46,10 +32,12 @@ bool is_part(const fs::path& path) {
 }  // namespace
 
 fs::path ResultsFolder::chunk(std::size_t index) const {
-  return chunks() / numbered(index, ".ndjson");
+  return chunks() / fmt::format("{:06}.ndjson", index);
 }
 
-fs::path ResultsFolder::run(std::size_t index) const { return runs() / numbered(index, ".json"); }
+fs::path ResultsFolder::run(std::size_t index) const {
+  return runs() / fmt::format("{:06}.json", index);
+}
 
 bool ResultsFolder::has_task() const {
   std::error_code ignored;
@@ -73,7 +61,7 @@ void ResultsFolder::require_own() const {
 
 std::optional<fs::path> ResultsFolder::foreign_file() const {
   for (const fs::path& folder : {folder_, chunks(), runs()}) {
-    for (const fs::path& path : paths_in(folder)) {
+    for (const fs::path& path : known_paths_in(folder)) {
       if (!is_part(path) && path != chunks() && path != runs()) {
         return path;
       }
@@ -84,7 +72,7 @@ std::optional<fs::path> ResultsFolder::foreign_file() const {
 
 std::vector<std::size_t> ResultsFolder::finished_chunks(std::size_t end) const {
   std::vector<std::size_t> found;
-  for (const fs::path& path : paths_in(chunks())) {
+  for (const fs::path& path : known_paths_in(chunks())) {
     const std::string stem = path.stem().string();
     std::size_t index = 0;
     std::from_chars(stem.data(), stem.data() + stem.size(), index);
@@ -103,7 +91,7 @@ void ResultsFolder::make() const {
   // A day: no living process takes so long to write a chunk, by whatever clock.
   const auto old = fs::file_time_type::clock::now() - std::chrono::hours(24);
   for (const fs::path& folder : {folder_, chunks(), runs()}) {
-    for (const fs::path& path : paths_in(folder)) {
+    for (const fs::path& path : known_paths_in(folder)) {
       std::error_code error;
       const auto written = fs::last_write_time(path, error);
       if (is_part(path) && !error && written < old) {
@@ -114,24 +102,16 @@ void ResultsFolder::make() const {
 }
 
 Chunk read_chunk(const fs::path& file, std::size_t unknowns) {
-  using Json = nlohmann::json;
-  std::ifstream stream(file, std::ios::binary);
-  Chunk chunk{.text = {std::istreambuf_iterator<char>(stream), {}}};
+  Chunk chunk{.text = read_bytes(file)};
   std::size_t records = 0;
   for (std::string_view left = chunk.text; !left.empty(); ++records) {
     const std::string_view line = left.substr(0, left.find('\n'));
     left.remove_prefix(std::min(line.size() + 1, left.size()));
-    bool failed = false;
-    // Keeps no value: only the record's own keys count, not those of its identity.
-    const auto note = [&](int depth, Json::parse_event_t event, const Json& parsed) {
-      const bool is_key = event == Json::parse_event_t::key;
-      failed = failed || (is_key && depth == 1 && parsed == "error");
-      return !is_key;
-    };
-    if (!Json::parse(line, note, false).is_object()) {
+    const auto record = nlohmann::json::parse(line, nullptr, false);
+    if (!record.is_object()) {
       refuse(file, "line {} is no record; remove it and call palpate batch again", records + 1);
     }
-    chunk.failed += failed ? 1 : 0;
+    chunk.failed += record.contains("error") ? 1 : 0;
   }
   if (records != unknowns) {
     refuse(file, "has {} records instead of {}; remove it and call palpate batch again", records,

@@ -10,7 +10,7 @@
 #include "io/input_file.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/virtual_sensor.hpp"
-#include "streaming/import_array.hpp"
+#include "streaming/import_steps.hpp"
 
 namespace palpate::cli {
 
@@ -21,18 +21,12 @@ void add_detector_flags(CLI::App& command, DetectorFlags& flags, const std::stri
                      "value, in the sensor's unit [default: 2 kPa; required for raw pressure]");
   command.add_option("--release", flags.release,
                      "A touch ends when the pressure falls below this [default: half of --onset]");
-  command
-      .add_option("--steady", options.steady,
-                  "Largest relative deviation of the summed pressure in a touch's steady phase")
-      ->capture_default_str();
-  command
-      .add_option("--min-steady-s", options.min_steady_s,
-                  "Shortest steady phase of a touch, s; shorter contacts are ignored")
-      ->capture_default_str();
-  command
-      .add_option("--smooth-s", options.smooth_s,
-                  "Time over which pressures are averaged before they are judged, s")
-      ->capture_default_str();
+  add_with_default(command, "--steady", options.steady,
+                   "Largest relative deviation of the summed pressure in a touch's steady phase");
+  add_with_default(command, "--min-steady-s", options.min_steady_s,
+                   "Shortest steady phase of a touch, s; shorter contacts are ignored");
+  add_with_default(command, "--smooth-s", options.smooth_s,
+                   "Time over which pressures are averaged before they are judged, s");
   command.add_option("--drift-s", flags.drift_s,
                      "Time longer than any press, s: what an element reads for so long is no press "
                      "but its rest, which may drift and is subtracted [default: " +
@@ -87,7 +81,7 @@ std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
            "standard input holds the frames of --sensor -; give the poses as a file or a FIFO, or "
            "x_mm, y_mm and theta_rad in the lines of the frames");
   }
-  ArrayTable array = import_array(arguments.lines);
+  Recording array = import_array(arguments.lines);
   if (arguments.lines.sign < 0) {
     std::ranges::transform(array.baseline, array.baseline.begin(), std::negate<>{});
   }
@@ -101,25 +95,6 @@ std::unique_ptr<LineSensor> open_lines(const SensorArguments& arguments,
       warn, arguments.lines.sign);
 }
 
-/// Requires that the flags of an array are left out where the sensor has one.
-void require_no_array(const SensorArguments& arguments) {
-  const ImportOptions& given = arguments.lines;
-  const ImportOptions unset;
-  const bool is_set[] = {given.array != unset.array,
-                         given.first_element != unset.first_element,
-                         given.order != unset.order,
-                         given.dead != unset.dead,
-                         given.pressure_unit != unset.pressure_unit,
-                         given.sign != unset.sign};
-  for (std::size_t i = 0; i < std::size(array_flags); ++i) {
-    if (is_set[i]) {
-      refuse(array_flags[i],
-             "is for --sensor -, frames on standard input; sensor {} has an array of its own",
-             arguments.sensor);
-    }
-  }
-}
-
 }  // namespace
 
 OpenSensor open_sensor(const SensorArguments& arguments, const PosedSensor::Warn& warn) {
@@ -130,7 +105,6 @@ OpenSensor open_sensor(const SensorArguments& arguments, const PosedSensor::Warn
     opened.lines = lines.get();
     opened.sensor = std::move(lines);
   } else {
-    require_no_array(arguments);
     opened.sensor = is_virtual_sensor(name) ? open_virtual_sensor(name) : open_board(name);
   }
   if (!arguments.poses.empty()) {
@@ -176,12 +150,21 @@ void report_refused(const OpenSensor& opened) {
 
 void add_sensor_flags(CLI::App& command, SensorArguments& arguments,
                       const std::string& poses_default) {
-  command.add_option("--sensor", arguments.sensor, sensor_help)->required();
+  add_required(command, "--sensor", arguments.sensor, sensor_help);
   command.add_option("--poses", arguments.poses, std::string(poses_help) + poses_default);
   add_array_flags(command, arguments.lines);
   for (const char* flag : array_flags) {
     command.get_option(flag)->group("Of --sensor -");
   }
+  command.parse_complete_callback([&command, &arguments] {
+    for (const char* flag : array_flags) {
+      if (arguments.sensor != "-" && command.get_option(flag)->count() > 0) {
+        refuse(flag,
+               "is for --sensor -, frames on standard input; sensor {} has an array of its own",
+               arguments.sensor);
+      }
+    }
+  });
 }
 
 CLI::Option* add_array_flags(CLI::App& command, ImportOptions& options) {
@@ -191,26 +174,18 @@ CLI::Option* add_array_flags(CLI::App& command, ImportOptions& options) {
       "CSV file with a row 'x y' in mm for each element. Elements are counted in the order of "
       "their readings: of a grid row by row, where x grows along a row and y from row to row, "
       "unless the next two flags say otherwise");
-  command
-      .add_option("--first-element", options.first_element,
-                  "Corner of the grid whose element is read first, seen with x to the right and y "
-                  "upwards: bottom-left, bottom-right, top-left or top-right")
-      ->capture_default_str();
-  command
-      .add_option("--order", options.order,
-                  "How the grid's elements follow each other: rows (along x first) or columns")
-      ->capture_default_str();
+  add_with_default(command, "--first-element", options.first_element,
+                   "Corner of the grid whose element is read first, seen with x to the right and y "
+                   "upwards: bottom-left, bottom-right, top-left or top-right");
+  add_with_default(command, "--order", options.order,
+                   "How the grid's elements follow each other: rows (along x first) or columns");
   command.add_option("--dead", options.dead,
                      "Elements that do not read, counted from 0 in the order of their readings, as "
                      "13,42 [default: those without any reading]");
-  command
-      .add_option("--pressure-unit", options.pressure_unit,
-                  "Unit of the pressures: kPa, or raw for readings of another unit")
-      ->capture_default_str();
-  command
-      .add_option("--sign", options.sign,
-                  "-1 where readings fall under load: they are stored times -1 and rise")
-      ->capture_default_str();
+  add_with_default(command, "--pressure-unit", options.pressure_unit,
+                   "Unit of the pressures: kPa, or raw for readings of another unit");
+  add_with_default(command, "--sign", options.sign,
+                   "-1 where readings fall under load: they are stored times -1 and rise");
   return array;
 }
 

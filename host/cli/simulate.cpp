@@ -102,22 +102,17 @@ void add_simulate(CLI::App& app) {
   const auto [command, options] = add_command<SimulateArguments>(
       app, "simulate", "Simulate touches of a shape with a DigiTacts array and write a recording",
       simulate);
-  command
-      ->add_option("SHAPE", options->shape,
-                   "A to Z, 0 to 9, ring, bar, or a polygon file with lines 'x y' in mm")
-      ->required();
-  command->add_option("-o,--output", options->output, "Recording to write (HDF5)")->required();
-  command->add_option("--seed", options->seed, "Seed of noise, random poses and order")
-      ->check(require_whole_number)
-      ->capture_default_str();
-  command
-      ->add_option("--poses", options->poses,
-                   "grid (4 x 4 positions 6.8 mm apart, 12 angles at each) or random:N")
-      ->capture_default_str();
-  command->add_option("--psf-mm", options->sensor.psf_mm, "Point spread (standard deviation), mm")
-      ->capture_default_str();
-  command->add_option("--noise-kpa", options->sensor.noise_kpa, "Noise (standard deviation), kPa")
-      ->capture_default_str();
+  add_required(*command, "SHAPE", options->shape,
+               "A to Z, 0 to 9, ring, bar, or a polygon file with lines 'x y' in mm");
+  add_required(*command, "-o,--output", options->output, "Recording to write (HDF5)");
+  add_with_default(*command, "--seed", options->seed, "Seed of noise, random poses and order")
+      ->check(require_whole_number);
+  add_with_default(*command, "--poses", options->poses,
+                   "grid (4 x 4 positions 6.8 mm apart, 12 angles at each) or random:N");
+  add_with_default(*command, "--psf-mm", options->sensor.psf_mm,
+                   "Point spread (standard deviation), mm");
+  add_with_default(*command, "--noise-kpa", options->sensor.noise_kpa,
+                   "Noise (standard deviation), kPa");
   command->add_option("--object-pose", options->object_pose,
                       "Pose T_object_robot of an unknown object, X,Y,DEG in mm and degrees, or "
                       "random; the file stores it as the truth");

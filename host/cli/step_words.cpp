@@ -37,6 +37,78 @@ std::array<std::string, 3> numbers(const Pose& pose, const StandardDeviations& s
           text(pose.theta_rad, 2, degrees)};
 }
 
+std::string decision_words(const Decision& decision) {
+  const auto& [act, because] = decision;
+  return because.empty() ? "" : printable((act ? "act: " : "do not act: ") + because);
+}
+
+std::string truth_words(const RecognitionStep& step) {
+  if (step.truth.label.empty()) {
+    return "";
+  }
+  std::string words = "truth: " + printable(step.truth.label);
+  if (const std::optional<Pose> truth = step.true_T_robot_object()) {
+    words +=
+        fmt::format(" at {}; error {} mm", pose_words(*truth), error_text(step.pose_error_mm()));
+  }
+  return words;
+}
+
+/// Bounds that prove less than their tolerance asks for: those of the best label's probability, how
+/// much of the belief is unproven, and what ended the search. "" where they prove enough.
+std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task) {
+  const FilterTraits traits = traits_of(task.filter);
+  if (!traits.tolerance || !step.certificate) {
+    return "";
+  }
+  const auto [low, high] = step.identity_bounds[step.best];
+  const bool proven = step.certificate->dropped_mass <= *traits.tolerance;
+  // "(none)" has searches of its own, whose end a budget may not await.
+  constexpr double told = 0.05;
+  if (proven && (!traits.budget_s || high - low <= told)) {
+    return "";
+  }
+  const double unproven = 100.0 * step.certificate->dropped_mass;
+  const auto* bounded = std::get_if<BoundedOptions>(&task.filter);
+  const bool gave_up = bounded != nullptr && bounded->poor_bins &&
+                       step.certificate->bins_evaluated >= *bounded->poor_bins;
+  const std::string left =
+      fmt::format("{} left {} unproven",
+                  traits.budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *traits.budget_s)
+                  : gave_up       ? "the search, which met nothing but poor fits,"
+                                  : "rounding",
+                  proven             ? "the probability of (none)"
+                  : unproven >= 9.95 ? fmt::format("{:.0f} % of the belief", unproven)
+                                     : fmt::format("{:.2g} % of the belief", unproven));
+  // Bounds round outwards.
+  return fmt::format("{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {}",
+                     printable(task.labels[step.best]), 100.0 * step.confidence(),
+                     std::floor(1000.0 * low) / 10.0, std::ceil(1000.0 * high) / 10.0, left);
+}
+
+/// Touches that do not fit; "" where they fit or are doubtful.
+std::string misfit_sentence(const RecognitionStep& step, const RecognitionTask& task) {
+  if (!step.fit || step.fit->verdict != Verdict::does_not_fit) {
+    return "";
+  }
+  const std::string label = printable(posed_label(step, task));
+  return fmt::format("unlike {}: its {} {:.0f} standard deviations worse than touches of {} do",
+                     label,
+                     step.touches == 1 ? "touch fits" : fmt::format("{} touches fit", step.touches),
+                     -step.fit->z, label);
+}
+
+/// That "(none)" has a weight, but a single touch and no sensor model that tells what one touch
+/// says of it; else "".
+std::string single_touch_sentence(const RecognitionStep& step, const RecognitionTask& task) {
+  if (step.touches != 1 || task.labels.back() != none_label ||
+      task.fit_scale().stranger_single_touch) {
+    return "";
+  }
+  return "one touch cannot tell whether the object is one of the maps': the odds of (none) are "
+         "about the prior's";
+}
+
 }  // namespace
 
 std::array<std::string, 3> pose_cells(const Pose& T_robot_object, const StandardDeviations& sd) {
@@ -93,85 +165,6 @@ std::string result_words(const RecognitionStep& step, const RecognitionTask& tas
 std::string error_text(std::optional<double> error_mm) {
   return error_mm ? fmt::format("{:.2f}", *error_mm) : "-";
 }
-
-namespace {
-
-std::string decision_words(const Decision& decision) {
-  const auto& [act, because] = decision;
-  return because.empty() ? "" : printable((act ? "act: " : "do not act: ") + because);
-}
-
-std::string truth_words(const RecognitionStep& step) {
-  if (step.truth.label.empty()) {
-    return "";
-  }
-  std::string words = "truth: " + printable(step.truth.label);
-  if (const std::optional<Pose> truth = step.true_T_robot_object()) {
-    words +=
-        fmt::format(" at {}; error {} mm", pose_words(*truth), error_text(step.pose_error_mm()));
-  }
-  return words;
-}
-
-/// Bounds that prove less than their tolerance asks for: those of the best label's probability, how
-/// much of the belief is unproven, and what ended the search. "" where they prove enough.
-std::string unproven_sentence(const RecognitionStep& step, const RecognitionTask& task) {
-  const FilterTraits traits = traits_of(task.filter);
-  if (!traits.tolerance || !step.certificate) {
-    return "";
-  }
-  const auto [low, high] = step.identity_bounds[step.best];
-  const bool proven = step.certificate->dropped_mass <= *traits.tolerance;
-  // "(none)" has searches of its own, whose end a budget may not await.
-  constexpr double told = 0.05;
-  if (proven && (!traits.budget_s || high - low <= told)) {
-    return "";
-  }
-  const double unproven = 100.0 * step.certificate->dropped_mass;
-  const auto* bounded = std::get_if<BoundedOptions>(&task.filter);
-  const bool gave_up = bounded != nullptr && bounded->poor_bins &&
-                       step.certificate->bins_evaluated >= *bounded->poor_bins;
-  const std::string left =
-      fmt::format("{} left {} unproven",
-                  traits.budget_s ? fmt::format("the budget of {:g} ms", 1e3 * *traits.budget_s)
-                  : gave_up       ? "the search, which met nothing but poor fits,"
-                                  : "rounding",
-                  proven             ? "the probability of (none)"
-                  : unproven >= 9.95 ? fmt::format("{:.0f} % of the belief", unproven)
-                                     : fmt::format("{:.2g} % of the belief", unproven));
-  const std::string best = printable(task.labels[step.best]);
-  // Bounds round outwards.
-  const double least = std::floor(1000.0 * low) / 10.0;
-  const double highest = std::ceil(1000.0 * high) / 10.0;
-  return least == highest ? fmt::format("{}; {} has {:.1f} % all the same", left, best, least)
-                          : fmt::format("{} {:.1f} % (at least {:.1f} %, at most {:.1f} %): {}",
-                                        best, 100.0 * step.confidence(), least, highest, left);
-}
-
-/// Touches that do not fit; "" where they fit or are doubtful.
-std::string misfit_sentence(const RecognitionStep& step, const RecognitionTask& task) {
-  if (!step.fit || step.fit->verdict != Verdict::does_not_fit) {
-    return "";
-  }
-  const std::string label = printable(posed_label(step, task));
-  return fmt::format("unlike {}: its {} {:.0f} standard deviations worse than touches of {} do",
-                     label,
-                     step.touches == 1 ? "touch fits" : fmt::format("{} touches fit", step.touches),
-                     -step.fit->z, label);
-}
-
-/// That "(none)" has a weight, but a single touch and no sensor model that tells what one touch
-/// says of it; else "".
-std::string single_touch_sentence(const RecognitionStep& step, const RecognitionTask& task) {
-  if (step.touches != 1 || task.labels.back() != none_label ||
-      task.fit_scale().stranger_single_touch) {
-    return "";
-  }
-  return "one touch cannot tell whether the object is one of the maps': the odds of (none) are "
-         "about the prior's";
-}
-
-}  // namespace
 
 StepSentences sentences_of(const RecognitionStep& step, const RecognitionTask& task) {
   StepSentences words{.decision = decision_words(step.decision), .truth = truth_words(step)};

@@ -1,7 +1,6 @@
 #include "cli/text_table.hpp"
 
 #include <algorithm>
-#include <functional>
 #include <iterator>
 #include <utility>
 
@@ -38,20 +37,9 @@ std::string_view head(std::string_view text, std::size_t columns) {
 
 }  // namespace
 
-std::string shorten_middle(std::string_view text, std::size_t columns) {
-  constexpr std::string_view ellipsis = "...";
-  const std::size_t length = columns_of(text);
-  if (length <= columns) {
-    return std::string(text);
-  }
-  if (columns <= ellipsis.size()) {
-    return std::string(head(text, columns));
-  }
-  const std::size_t kept = columns - ellipsis.size();
-  const std::size_t tail = kept / 2;
-  const std::size_t tail_begin = head(text, length - tail).size();
-  return std::string(head(text, kept - tail)) + std::string(ellipsis) +
-         std::string(text.substr(tail_begin));
+std::string shortened(std::string_view text, std::size_t columns) {
+  return columns_of(text) <= columns ? std::string(text)
+                                     : std::string(head(text, columns - 3)) + "...";
 }
 
 std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
@@ -62,16 +50,6 @@ std::string range_words(const Interval& interval) {
 
 std::string count_of(std::size_t count, const char* one, const char* more) {
   return fmt::format("{} {}", count, count == 1 ? one : more);
-}
-
-std::string tally(std::vector<std::pair<std::string, std::size_t>> answers) {
-  std::ranges::stable_sort(answers, std::ranges::greater{},
-                           &std::pair<std::string, std::size_t>::second);
-  std::string text;
-  for (const auto& [answer, count] : answers) {
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, answer);
-  }
-  return text;
 }
 
 TextTable::TextTable(std::vector<Column> columns) : columns_(std::move(columns)) {}

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 namespace palpate {
@@ -13,9 +12,9 @@ struct Scores;
 
 namespace palpate::cli {
 
-/// The text, or its beginning and end with "..." between them, in at most `columns` columns. Every
-/// character counts as one column.
-std::string shorten_middle(std::string_view text, std::size_t columns);
+/// The text, or its beginning and "...", in at most `columns` columns, 3 or more. Every character
+/// counts as one column.
+std::string shortened(std::string_view text, std::size_t columns);
 
 /// A share as "12.3 %".
 std::string percent(double share);
@@ -23,8 +22,6 @@ std::string percent(double share);
 std::string range_words(const Interval& interval);
 /// A count with its noun: "1 record", "2 records".
 std::string count_of(std::size_t count, const char* one, const char* more);
-/// Answers with how often each was given, the most frequent first: "3 A, 1 (none)".
-std::string tally(std::vector<std::pair<std::string, std::size_t>> answers);
 
 /// A table for people. Every column is as wide as its longest cell; a column without any content is
 /// left out. Bytes that cannot be shown become '?'.

@@ -94,60 +94,65 @@ class PressWatch {
     if (!touching) {
       return;
     }
-    pressed_s_ = pressed_s_.value_or(last_s_);
+    press_ = press_.value_or(Press{.begin_s = last_s_});
     if (const std::optional<Pose>& pose = frame.T_robot_sensor) {
-      first_pose_ = first_pose_.value_or(*pose);
-      moved_mm_ =
-          std::max(moved_mm_, glm::distance(first_pose_->translation_mm, pose->translation_mm));
+      press_->first_pose = press_->first_pose.value_or(*pose);
+      press_->moved_mm =
+          std::max(press_->moved_mm,
+                   glm::distance(press_->first_pose->translation_mm, pose->translation_mm));
     }
   }
   /// Takes the end of a press, and whether it makes touches.
   void end(bool makes_touches) {
-    if (!makes_touches && pressed_s_ && missed_++ < most_shown) {
+    if (!makes_touches) {
       const std::string press = fmt::format("the press {:.1f} s from its start, of {:.2f} s,",
-                                            *pressed_s_ - *first_s_, last_s_ - *pressed_s_);
-      words_.push_back(
-          moved_mm_ >= options_.steady_mm
+                                            press_->begin_s - *first_s_, last_s_ - press_->begin_s);
+      missed_.push_back(
+          press_->moved_mm >= options_.steady_mm
               ? fmt::format("{} moved by {:.1f} mm (hold the array still, or give --slide MM)",
-                            press, moved_mm_)
+                            press, press_->moved_mm)
               : fmt::format("{} was never steady for {:g} s (press longer, or give another "
                             "--min-steady-s or --steady)",
                             press, options_.min_steady_s));
     }
-    pressed_s_.reset();
-    first_pose_.reset();
-    moved_mm_ = 0.0;
+    press_.reset();
   }
 
+  /// Presses without a touch.
+  std::size_t missed() const { return missed_.size(); }
   /// Why no press made a touch, and what to give, in sentences.
   /// @param unit of the pressures
   std::vector<std::string> reasons(const std::string& unit) const {
-    std::vector<std::string> words = words_;
-    if (missed_ > most_shown) {
-      words.push_back(fmt::format("and {} more presses make no touch", missed_ - most_shown));
-    }
-    if (missed_ == 0) {
-      words.push_back(
+    constexpr std::size_t most_shown = 3;
+    if (missed_.empty()) {
+      return {
           fmt::format("its readings reach {:.3g} {} above their rest, {:.1f} s from its start, and "
                       "a touch begins above {:g} (lower --onset)",
-                      largest_, unit, largest_s_, options_.onset));
+                      largest_, unit, largest_s_, options_.onset)};
+    }
+    std::vector<std::string> words = missed_;
+    if (words.size() > most_shown) {
+      words.resize(most_shown);
+      words.push_back(
+          fmt::format("and {} more presses make no touch", missed_.size() - most_shown));
     }
     return words;
   }
 
  private:
-  static constexpr std::size_t most_shown = 3;
+  struct Press {
+    double begin_s = 0.0;
+    std::optional<Pose> first_pose = {};
+    double moved_mm = 0.0;  ///< from it, at most
+  };
 
   TouchDetectorOptions options_;
-  std::optional<double> first_s_;    ///< of the stream
-  std::optional<double> pressed_s_;  ///< when the press under way began
+  std::optional<double> first_s_;  ///< of the stream
   double last_s_ = 0.0;
-  std::optional<Pose> first_pose_;  ///< of the press under way
-  double moved_mm_ = 0.0;           ///< from it, at most
-  double largest_ = 0.0;            ///< pressure above the rest
-  double largest_s_ = 0.0;          ///< when, from the first frame on
-  std::size_t missed_ = 0;
-  std::vector<std::string> words_;  ///< of the first presses without a touch
+  std::optional<Press> press_;  ///< under way
+  double largest_ = 0.0;        ///< pressure above the rest
+  double largest_s_ = 0.0;      ///< when, from the first frame on
+  std::vector<std::string> missed_;
 };
 
 /// Appends the touch and a row of `valid` for it, `unposed` at the pose 0; returns false where the
@@ -163,40 +168,38 @@ bool append(const DetectedTouch& touch, bool unposed, Recording& recording) {
   return true;
 }
 
-/// Counts of a stream's presses, and why some make no touch.
-struct Presses {
-  std::size_t all = 0;
-  std::size_t without_pose = 0;
-  std::size_t unsteady = 0;
-};
-
 std::optional<SetupFinding> clock_of(std::span<const SetupFinding> findings) {
   const auto clock = std::ranges::find(findings, "clock", &SetupFinding::what);
   return clock == findings.end() ? std::nullopt : std::optional(*clock);
 }
 
 /// The finding "dropped", where a good part of the presses make no touch.
-std::optional<SetupFinding> dropped(const Presses& presses,
+/// @param touches that were kept
+std::optional<SetupFinding> dropped(std::size_t touches, std::size_t without_pose,
+                                    std::size_t unsteady,
                                     const std::optional<SetupFinding>& clock) {
-  const std::size_t lost = presses.without_pose + presses.unsteady;
-  if (10 * lost <= presses.all) {
+  const std::size_t lost = without_pose + unsteady;
+  const std::size_t all = touches + lost;
+  if (10 * lost <= all) {
     return {};
   }
   std::vector<std::string> reasons;
-  if (presses.without_pose > 0) {
-    reasons.push_back(fmt::format("{} without a pose", presses.without_pose));
+  if (without_pose > 0) {
+    reasons.push_back(fmt::format("{} without a pose", without_pose));
   }
-  if (presses.unsteady > 0) {
+  if (unsteady > 0) {
     reasons.push_back(
-        fmt::format("{} that move or are steady for less than `min-steady-s`", presses.unsteady));
+        fmt::format("{} that move or are steady for less than `min-steady-s`", unsteady));
   }
-  return SetupFinding{"dropped", 0.0,
-                      fmt::format("{} of {} presses were left out: {}{}", lost, presses.all,
-                                  fmt::join(reasons, ", "),
-                                  clock ? fmt::format("; the clocks differ: import with `{}`",
-                                                      fmt::join(clock->options, "` and `"))
-                                        : ""),
-                      clock ? clock->options : std::vector<std::string>{}};
+  SetupFinding finding{
+      "dropped", 0.0,
+      fmt::format("{} of {} presses were left out: {}", lost, all, fmt::join(reasons, ", "))};
+  if (clock) {
+    finding.words +=
+        fmt::format("; the clocks differ: import with `{}`", fmt::join(clock->options, "` and `"));
+    finding.options = clock->options;
+  }
+  return finding;
 }
 
 /// Where every touch has the same elements dead, keeps one list for all touches: `dead`, which may
@@ -253,7 +256,7 @@ void find_touches(const TouchesArguments& options) {
 
   std::uint64_t unknown = 0;
   std::uint64_t unreadable = 0;
-  Presses presses;
+  std::size_t without_pose = 0;
   bool touching = false;
   PressWatch watch(thresholds);
   std::optional<StrokeTouches> stroke;
@@ -269,10 +272,9 @@ void find_touches(const TouchesArguments& options) {
     if (found.empty() && touch) {
       found.push_back(*touch);
     }
-    presses.unsteady += found.empty() ? 1 : 0;
     watch.end(!found.empty());
     for (const DetectedTouch& one : found) {
-      presses.without_pose += append(one, options.unposed, recording) ? 0 : 1;
+      without_pose += append(one, options.unposed, recording) ? 0 : 1;
     }
   };
   const Rest rest = rest_of(*stream, thresholds, options.detector.drift_s);
@@ -307,20 +309,19 @@ void find_touches(const TouchesArguments& options) {
     take(touch);
   }
   take(detector.finish());
-  presses.all = recording.size() + presses.without_pose + presses.unsteady;
   const std::optional<SetupFinding> clock = clock_of(sensor.findings);
-  if (const auto finding = dropped(presses, clock)) {
+  if (const auto finding = dropped(recording.size(), without_pose, watch.missed(), clock)) {
     recording.findings.push_back(*finding);
   }
   const std::vector<std::string> findings =
       frame_findings(rest, backwards, stream->counters().frames);
 
   if (recording.size() == 0) {
-    if (presses.without_pose > 0) {
+    if (without_pose > 0) {
       refuse(options.frames,
              "none of its {} touches has a pose; {}, or keep them for 'palpate map --unposed' with "
              "--unposed",
-             presses.without_pose,
+             without_pose,
              clock ? fmt::format("import again with --{}", fmt::join(clock->options, " --"))
                    : "record again with --poses");
     }
@@ -337,11 +338,11 @@ void find_touches(const TouchesArguments& options) {
   write_recording(options.output, recording);
   fmt::print("{}: {} touches in {} frames of {}", options.output, recording.size(),
              stream->counters().frames, options.frames);
-  if (presses.without_pose > 0) {
-    fmt::print(", {} without a pose left out", presses.without_pose);
+  if (without_pose > 0) {
+    fmt::print(", {} without a pose left out", without_pose);
   }
-  if (presses.unsteady > 0) {
-    fmt::print(", {} left out as not steady", presses.unsteady);
+  if (watch.missed() > 0) {
+    fmt::print(", {} left out as not steady", watch.missed());
   }
   if (clock) {
     fmt::print(", clocks differ (palpate import --{})", fmt::join(clock->options, " --"));
@@ -369,15 +370,11 @@ void add_touches(CLI::App& app) {
       "Find the touches in a recording of frames and write them for 'palpate map' and 'palpate "
       "recognize'. A recording that was cut off is closed, as by 'palpate info --close'",
       find_touches);
-  command
-      ->add_option("FRAMES", options->frames,
-                   "Recording of frames, as 'palpate record' writes it (HDF5)")
-      ->required();
-  command
-      ->add_option("-o,--output", options->output,
-                   "Recording of touches to write (HDF5): per touch, the mean pressures above the "
-                   "elements' rest in its steady phase")
-      ->required();
+  add_required(*command, "FRAMES", options->frames,
+               "Recording of frames, as 'palpate record' writes it (HDF5)");
+  add_required(*command, "-o,--output", options->output,
+               "Recording of touches to write (HDF5): per touch, the mean pressures above the "
+               "elements' rest in its steady phase");
   add_detector_flags(*command, options->detector,
                      "the shortest of 2 to 32 that leaves no press in the rest; 0: the rest is the "
                      "recording's baseline");

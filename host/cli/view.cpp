@@ -49,11 +49,9 @@ void add_view(CLI::App& app) {
       "Show saved files in a browser, until Ctrl-C: recordings frame by frame, maps, and results "
       "of recognize, live and batch, which can be filtered and sorted",
       view);
-  command
-      ->add_option(
-          "PATH", options->paths,
-          "Recordings, maps, JSON of recognize or live, folders of batch, or folders of such files")
-      ->required();
+  add_required(
+      *command, "PATH", options->paths,
+      "Recordings, maps, JSON of recognize or live, folders of batch, or folders of such files");
   add_page_flags(*command, options->page);
 }
 

@@ -1,4 +1,4 @@
-#include "io/column_choice.hpp"
+#include "io/table_columns.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -59,10 +59,8 @@ class Choice {
     if (part.find('*') != part.npos || part.find(number_mark) != part.npos) {
       return add_matches(part);
     }
-    if (const auto column = table_.find_or_count(part)) {
-      return add_one(*column);
-    }
-    return add_every(part) || add_range(part) || add_prefixed(part);
+    const auto column = table_.find_or_count(part);
+    return column ? add_one(*column) : add_every(part) || add_range(part) || add_prefixed(part);
   }
 
   std::vector<std::size_t> columns;
@@ -113,42 +111,40 @@ class Choice {
     const std::size_t colons = part.rfind("::");
     const auto step = colons == part.npos ? std::nullopt : whole_number_of(part.substr(colons + 2));
     const auto first = step ? table_.find_or_count(part.substr(0, colons)) : std::nullopt;
-    if (!first || *step < 1) {
-      return false;
-    }
-    for (std::size_t i = *first; i < table_.columns().size();
-         i += static_cast<std::size_t>(*step)) {
-      if (!is_taken(i)) {
-        add_one(i);
-      }
-    }
-    return true;
+    return first && *step >= 1 && add_those([&](std::size_t i) {
+             const bool is_one = i >= *first && (i - *first) % static_cast<std::size_t>(*step) == 0;
+             return is_one ? std::optional<std::int64_t>(0) : std::nullopt;
+           });
   }
 
   bool add_matches(std::string_view pattern) {
-    std::vector<std::pair<std::int64_t, std::size_t>> found;
-    for (std::size_t i = 0; i < table_.columns().size(); ++i) {
+    return add_those([&](std::size_t i) {
       const Match matched = match(table_.columns()[i], pattern);
-      if (matched.is_whole && !is_taken(i)) {
-        found.emplace_back(matched.number.value_or(0), i);
-      }
-    }
-    std::ranges::sort(found);
-    for (const auto& [number, column] : found) {
-      add_one(column);
-    }
-    return !found.empty();
+      return matched.is_whole ? std::optional(matched.number.value_or(0)) : std::nullopt;
+    });
   }
 
   bool add_prefixed(std::string_view prefix) {
-    const std::size_t before = columns.size();
+    return add_those([&](std::size_t i) {
+      const std::string_view begin = std::string_view(table_.columns()[i]).substr(0, prefix.size());
+      return alike(begin, prefix) ? std::optional<std::int64_t>(0) : std::nullopt;
+    });
+  }
+
+  /// Adds the columns that hold nothing else and to which `number` gives a number, in the order of
+  /// the numbers; false where there are none.
+  bool add_those(const std::function<std::optional<std::int64_t>(std::size_t)>& number) {
+    std::vector<std::pair<std::int64_t, std::size_t>> found;
     for (std::size_t i = 0; i < table_.columns().size(); ++i) {
-      const std::string_view name = table_.columns()[i];
-      if (alike(name.substr(0, prefix.size()), prefix) && !is_taken(i)) {
-        add_one(i);
+      if (const auto of_column = is_taken(i) ? std::nullopt : number(i)) {
+        found.emplace_back(*of_column, i);
       }
     }
-    return columns.size() > before;
+    std::ranges::sort(found);
+    for (const auto& [order, column] : found) {
+      add_one(column);
+    }
+    return !found.empty();
   }
 
   const CsvTable& table_;

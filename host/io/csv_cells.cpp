@@ -26,17 +26,22 @@ std::size_t closing_quote(std::string_view line, std::size_t begin) {
   return at;
 }
 
-/// The number of cells; 0 where the line is no row. One that ends in a separator counts the empty
-/// cell behind it.
-std::size_t count_cells(std::string_view line, char separator) {
-  std::vector<std::string_view> cells;
-  return split_cells(line, separator, cells) == nullptr ? cells.size() : 0;
-}
-
+/// The cells, with the empty one behind a last separator; none where the line is no row.
 std::vector<std::string_view> cells_in(std::string_view line, char separator) {
   std::vector<std::string_view> cells;
-  split_cells(line, separator, cells);
-  return cells;
+  const bool is_row = split_cells(line, separator, cells) == nullptr;
+  return is_row ? cells : std::vector<std::string_view>();
+}
+
+/// True for the text of a number, finite or not.
+bool is_numeric(std::string_view cell, char separator) {
+  std::string text(cell.substr(cell.starts_with('+') ? 1 : 0));
+  if (separator != ',') {
+    std::ranges::replace(text, ',', '.');
+  }
+  double number = 0.0;
+  const char* const end = text.data() + text.size();
+  return !text.empty() && std::from_chars(text.data(), end, number).ptr == end;
 }
 
 bool is_half_empty(const std::vector<std::string_view>& cells) {
@@ -132,16 +137,6 @@ std::optional<double> number_in(std::string_view cell, char separator) {
   return number_of(with_point);
 }
 
-bool is_numeric(std::string_view cell, char separator) {
-  std::string text(cell.substr(cell.starts_with('+') ? 1 : 0));
-  if (separator != ',') {
-    std::ranges::replace(text, ',', '.');
-  }
-  double number = 0.0;
-  const char* const end = text.data() + text.size();
-  return !text.empty() && std::from_chars(text.data(), end, number).ptr == end;
-}
-
 bool are_numbers(const std::vector<std::string_view>& cells, char separator) {
   return std::ranges::all_of(
       cells, [&](std::string_view cell) { return cell.empty() || is_numeric(cell, separator); });
@@ -180,7 +175,7 @@ TableStart find_table(const std::vector<std::string>& lines) {
   std::size_t largest = 0;
   for (const std::string& line : lines) {
     const char separator = separator_of(line);
-    const std::size_t width = count_cells(line, separator);
+    const std::size_t width = cells_in(line, separator).size();
     const std::size_t count = width == 0 ? 0 : ++counts[{separator, width}];
     // Of shapes as frequent the one that comes last, but for lines that have no separator.
     if (count > largest || (count == largest && width > 1)) {
@@ -191,7 +186,9 @@ TableStart find_table(const std::vector<std::string>& lines) {
   const char separator = shape.first;
   const std::size_t width = shape.second;
   TableStart start{.first = 0, .separator = separator};
-  const auto has_width = [&](std::size_t i) { return count_cells(lines[i], separator) == width; };
+  const auto has_width = [&](std::size_t i) {
+    return cells_in(lines[i], separator).size() == width;
+  };
   while (start.first < lines.size() && !has_width(start.first)) {
     const auto cells = cells_in(lines[start.first], separator);
     if (cells.size() > 1 && are_numbers(cells, separator)) {

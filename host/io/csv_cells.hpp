@@ -30,10 +30,7 @@ const char* split_cells(std::string_view line, char separator,
 /// the cell holds anything else.
 std::optional<double> number_in(std::string_view cell, char separator);
 
-/// True for the text of a number, finite or not: 1, -2.5, inf, nan, 1e999.
-bool is_numeric(std::string_view cell, char separator);
-
-/// True for a row of such texts and empty cells.
+/// True for a row of numbers, finite or not (1, -2.5, inf, nan, 1e999), and of empty cells.
 bool are_numbers(const std::vector<std::string_view>& cells, char separator);
 
 /// Where rows of a table begin in a text that may hold other lines before them.

@@ -6,12 +6,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <cwchar>
+#include <locale>
 #include <set>
 #include <utility>
 
 #include <fmt/ranges.h>
 
-#include "model/descriptor.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 
@@ -19,10 +20,11 @@ namespace palpate {
 
 namespace {
 
+constexpr std::size_t block_bytes = 1 << 20;
+// A row of 100,000 numbers is shorter; a file without line ends must not fill the memory.
+constexpr std::size_t longest_line = 16 << 20;
 // Lines that show where a table begins.
 constexpr std::size_t enough_lines = 200;
-
-bool is_unknown(std::string_view cell) { return cell.empty() || alike(cell, "nan"); }
 
 /// The separator that a spreadsheet's first line "sep=;" names.
 std::optional<char> separator_named(std::string_view line) {
@@ -33,6 +35,90 @@ std::optional<char> separator_named(std::string_view line) {
 }
 
 }  // namespace
+
+TextLines::TextLines(std::filesystem::path path) : path_(std::move(path)) {
+  require_readable(path_);
+  file_ = Descriptor(path_, O_RDONLY);
+  block_.reserve(2 * block_bytes);  // on the heap, so that a line stays where it is as this moves
+}
+
+bool TextLines::next() {
+  std::size_t end = block_.find('\n', begin_);
+  while (end == block_.npos && !at_end_) {
+    const std::size_t unread = block_.size() - begin_;
+    read_block();
+    end = block_.find('\n', unread);
+  }
+  if (end == block_.npos && begin_ == block_.size()) {
+    return false;
+  }
+  end = std::min(end, block_.size());
+  line_ = std::string_view(block_).substr(begin_, end - begin_);
+  begin_ = std::min(end + 1, block_.size());
+  ++number_;
+  return true;
+}
+
+void TextLines::read_block() {
+  block_.erase(0, begin_);
+  begin_ = 0;
+  const std::size_t kept = block_.size();
+  if (kept > longest_line) {
+    refuse(path_, "line {} is longer than 16 MB: this is no table; give one row a line",
+           number_ + 1);
+  }
+  std::string own(block_bytes, '\0');
+  const ssize_t got = ::read(file_.get(), own.data(), own.size());
+  if (got < 0) {
+    refuse(path_, "cannot be read: {}; copy or record it again", std::strerror(errno));
+  }
+  std::string_view bytes(own.data(), static_cast<std::size_t>(got));
+  at_end_ = bytes.empty();
+  if (encoding_ == Encoding::unknown) {
+    encoding_ = Encoding::utf8;
+    for (const auto& [mark, encoding] :
+         {std::pair<std::string_view, Encoding>{"\xEF\xBB\xBF", Encoding::utf8},
+          {"\xFF\xFE", Encoding::utf16_little},
+          {"\xFE\xFF", Encoding::utf16_big}}) {
+      if (bytes.starts_with(mark)) {
+        encoding_ = encoding;
+        bytes.remove_prefix(mark.size());
+        break;
+      }
+    }
+  }
+  if (encoding_ == Encoding::utf8) {
+    block_ += bytes;
+  } else {
+    append_utf16(bytes);
+  }
+  if (block_.find('\0', kept) != block_.npos) {
+    refuse(path_, "is no text; save the table as CSV in UTF-8; palpate.Recording takes arrays");
+  }
+}
+
+void TextLines::append_utf16(std::string_view bytes) {
+  left_ += bytes;
+  const std::size_t high = encoding_ == Encoding::utf16_big ? 0 : 1;
+  std::u16string units;
+  for (std::size_t at = 0; at + 2 <= left_.size(); at += 2) {
+    units += static_cast<char16_t>(static_cast<unsigned char>(left_[at + high]) << 8 |
+                                   static_cast<unsigned char>(left_[at + 1 - high]));
+  }
+  using Utf = std::codecvt<char16_t, char8_t, std::mbstate_t>;
+  std::u8string text(3 * units.size(), u8'\0');
+  std::mbstate_t state{};
+  const char16_t* read = units.data();
+  char8_t* written = text.data();
+  const auto result =
+      std::use_facet<Utf>(std::locale::classic())
+          .out(state, read, read + units.size(), read, written, written + text.size(), written);
+  if (result == Utf::error) {
+    refuse(path_, "is no text in UTF-16, as its first bytes say; save the table in UTF-8");
+  }
+  block_.append(text.data(), written);
+  left_.erase(0, 2 * static_cast<std::size_t>(read - units.data()));
+}
 
 CsvTable::CsvTable(std::filesystem::path path, std::uint64_t header_line)
     : path_(std::move(path)), lines_(path_) {
@@ -49,12 +135,10 @@ void CsvTable::find_start(std::uint64_t header_line) {
   std::vector<std::uint64_t> numbers;
   std::optional<char> named;
   while (lines.size() < enough_lines + header_line && next_line()) {
-    named = numbers.empty() && !named ? separator_named(line_) : named;
-    if (named && lines.empty() && separator_named(line_)) {
+    if (const auto separator = separator_named(line_); separator && lines.empty()) {
+      named = named ? named : separator;
       ++skipped_lines_;
-      continue;
-    }
-    if (number_ >= header_line) {
+    } else if (number_ >= header_line) {
       lines.emplace_back(line_);
       numbers.push_back(number_);
     }
@@ -86,7 +170,13 @@ void CsvTable::name_columns() {
   if (has_header_ && cells_.size() > 1 && cells_.back().empty()) {
     cells_.pop_back();  // a separator ends each row
   }
-  first_cells_.assign(cells_.begin(), cells_.end());
+  constexpr std::size_t enough = 4;
+  std::vector<std::string> shown;
+  for (std::size_t i = 0; i < std::min(enough, cells_.size()); ++i) {
+    shown.push_back(fmt::format("'{}'", printable(cells_[i])));
+  }
+  header_words_ =
+      fmt::format("{}{}", fmt::join(shown, ", "), cells_.size() > enough ? ", ..." : "");
   std::set<std::string> seen;
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     columns_.push_back(has_header_ ? std::string(cells_[i]) : std::to_string(i + 1));
@@ -95,15 +185,6 @@ void CsvTable::name_columns() {
       refuse_columns("two columns are called '{}'; rename one", printable(name));
     }
   }
-}
-
-std::string CsvTable::header_words() const {
-  constexpr std::size_t enough = 4;
-  std::vector<std::string> shown;
-  for (std::size_t i = 0; i < std::min(enough, first_cells_.size()); ++i) {
-    shown.push_back(fmt::format("'{}'", printable(first_cells_[i])));
-  }
-  return fmt::format("{}{}", fmt::join(shown, ", "), first_cells_.size() > enough ? ", ..." : "");
 }
 
 std::optional<std::size_t> CsvTable::find(std::string_view name) const {
@@ -182,7 +263,7 @@ bool CsvTable::next_numbers(bool& passed) {
 
 std::optional<double> CsvTable::number(std::size_t column) const {
   const std::string_view cell = cells_[column];
-  if (is_unknown(cell)) {
+  if (cell.empty() || alike(cell, "nan")) {
     return {};
   }
   const std::optional<double> number = number_in(cell, separator_);
@@ -204,18 +285,10 @@ double CsvTable::require_number(std::size_t column) const {
 }
 
 std::uint64_t CsvTable::count_lines() const {
-  constexpr std::size_t block_bytes = 1 << 20;
-  const Descriptor file(path_, O_RDONLY);
-  std::string bytes(block_bytes, '\0');
-  std::uint64_t lines = 1;  // the last line may lack its end
-  ssize_t got = 0;
-  while ((got = ::read(file.get(), bytes.data(), bytes.size())) > 0) {
-    lines += static_cast<std::uint64_t>(std::count(bytes.data(), bytes.data() + got, '\n'));
+  TextLines lines(path_);
+  while (lines.next()) {
   }
-  if (got < 0) {
-    palpate::refuse(path_, "cannot be read: {}; copy or record it again", std::strerror(errno));
-  }
-  return lines;
+  return lines.number();
 }
 
 /// Finds the next line that holds anything: line_, without its comment.

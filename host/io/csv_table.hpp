@@ -10,9 +10,38 @@
 
 #include "io/csv_cells.hpp"
 #include "io/input_file.hpp"
-#include "io/text_lines.hpp"
+#include "model/descriptor.hpp"
 
 namespace palpate {
+
+/// Reads the lines of a text file in constant memory: UTF-8, or UTF-16 with a byte order mark, as
+/// spreadsheets save it.
+class TextLines {
+ public:
+  /// @throws Error where the file cannot be read
+  explicit TextLines(std::filesystem::path path);
+
+  /// Goes on to the next line; false after the last.
+  /// @throws Error where the file cannot be read, is no text, or a line is longer than 16 MB
+  bool next();
+  /// The line without its end; valid until next().
+  std::string_view line() const { return line_; }
+  std::uint64_t number() const { return number_; }  ///< of the line, from 1
+
+ private:
+  void read_block();
+  void append_utf16(std::string_view bytes);
+
+  std::filesystem::path path_;
+  Descriptor file_;
+  enum class Encoding { unknown, utf8, utf16_little, utf16_big } encoding_ = Encoding::unknown;
+  std::string left_;       ///< of UTF-16: bytes of a character whose rest is not read yet
+  std::string block_;      ///< text in UTF-8, from the present line on
+  std::size_t begin_ = 0;  ///< where the next line begins in block_
+  bool at_end_ = false;    ///< the whole file is in block_
+  std::string_view line_;
+  std::uint64_t number_ = 0;
+};
 
 /// Reads a table of numbers from a text file, row by row, in constant memory.
 ///
@@ -44,7 +73,7 @@ class CsvTable {
   /// Number of the line that holds the names, or of the first row.
   std::uint64_t header_number() const { return header_number_; }
   /// Its first cells, "'time', 'p0', 'p1', ...".
-  std::string header_words() const;
+  const std::string& header_words() const { return header_words_; }
 
   /// Passes over the rows whose cell in the column is not this text, or this number.
   void keep_where(std::size_t column, std::string value);
@@ -81,8 +110,8 @@ class CsvTable {
                     header_words());
   }
 
-  /// Returns at least the number of rows that are left, for reserving memory.
-  /// @throws Error where the file cannot be read
+  /// The file's lines, at least as many as its rows: for reserving memory.
+  /// @throws Error as next()
   std::uint64_t count_lines() const;
 
  private:
@@ -105,7 +134,7 @@ class CsvTable {
   bool row_is_ready_ = false;  ///< the first row, which was no header
   bool row_is_first_ = false;  ///< the row is the table's first, which was no header
   std::vector<std::string> columns_;
-  std::vector<std::string> first_cells_;  ///< of the header, or the first row
+  std::string header_words_;
   std::vector<std::string_view> cells_;
   std::vector<std::pair<std::size_t, std::string>> kept_;
 };

@@ -1,7 +1,9 @@
 #include "io/drawing_file.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <png.h>
@@ -18,11 +20,8 @@ std::uint8_t luma(std::uint32_t red, std::uint32_t green, std::uint32_t blue) {
 }
 
 bool ends_in(const std::filesystem::path& path, const char* ending) {
-  std::string own = path.extension().string();
-  std::ranges::transform(own, own.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return own == ending;
+  const auto lower = [](unsigned char c) { return std::tolower(c); };
+  return std::ranges::equal(path.extension().string(), std::string_view(ending), {}, lower);
 }
 
 /// Reads which places of a PNG picture on white paper, or black where light is occupied, are

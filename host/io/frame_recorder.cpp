@@ -1,6 +1,7 @@
 #include "palpate/frame_recorder.hpp"
 
 #include <fmt/format.h>
+#include <sys/file.h>
 
 #include <algorithm>
 #include <chrono>
@@ -16,7 +17,6 @@
 #include "io/hdf5_writer.hpp"
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
-#include "io/recording_state.hpp"
 #include "model/log_message.hpp"
 #include "model/printable.hpp"
 #include "model/stream_time.hpp"
@@ -44,7 +44,6 @@ struct Rows {
   std::vector<double> time_s;
 
   std::size_t size() const { return time_s.size(); }
-  void clear() { *this = {}; }
 };
 
 // Returns the recording without its rows.
@@ -102,7 +101,7 @@ struct FrameRecorder::Impl {
       append();
       saved += rows;
     }
-    pending.clear();
+    pending = {};
   }
 
   // Calls use(name, shape of a row, values) of every dataset that grows. `time` comes last: a row
@@ -158,9 +157,10 @@ struct FrameRecorder::Impl {
     set_appendable(access.get());
     H5Pset_file_locking(access.get(), true, true);  // some network file systems have no locks
     file = {H5Fopen(finished.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()), H5Fclose};
-    // HDF5 locks a file with SWMR only while it opens it.
+    // HDF5 locks a file with SWMR only while it opens it. This lock, which recorder_of() looks for,
+    // lasts while the file is open; a file system without locks refuses it.
     if (void* descriptor = nullptr; H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor) >= 0) {
-      mark_as_being_recorded(*static_cast<int*>(descriptor));
+      ::flock(*static_cast<int*>(descriptor), LOCK_SH | LOCK_NB);
     }
     bool open = file.valid();
     each_dataset([&](const char* name, const Hdf5Writer::Shape&, const auto&) {

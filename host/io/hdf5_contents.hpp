@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "io/hdf5_handle.hpp"
@@ -63,14 +65,21 @@ class Hdf5Contents {
   /// Reads the numbers of these rows in pieces.
   void read(const std::string& dataset, const Take& take, std::uint64_t first_row = 0,
             std::uint64_t rows = UINT64_MAX) const;
-  /// Returns the numbers of these rows.
-  template <typename Number>
-  std::vector<Number> read(const std::string& dataset, std::uint64_t first_row = 0,
-                           std::uint64_t rows = UINT64_MAX) const {
-    std::vector<Number> all;
-    all.reserve(size(dataset, first_row, rows));
+  /// Returns the values of these rows, each of one number or of as many doubles as it holds.
+  template <typename Value>
+  std::vector<Value> read(const std::string& dataset, std::uint64_t first_row = 0,
+                          std::uint64_t rows = UINT64_MAX) const {
+    constexpr std::size_t width = std::is_arithmetic_v<Value> ? 1 : sizeof(Value) / sizeof(double);
+    std::vector<Value> all;
+    all.reserve(size(dataset, first_row, rows) / width);
     const auto take = [&](std::uint64_t, std::span<const double> some) {
-      all.insert(all.end(), some.begin(), some.end());
+      if constexpr (std::is_arithmetic_v<Value>) {
+        all.insert(all.end(), some.begin(), some.end());
+      } else {
+        const std::size_t before = all.size();
+        all.resize(before + some.size() / width);
+        std::memcpy(static_cast<void*>(&all[before]), some.data(), some.size_bytes());
+      }
     };
     read(dataset, take, first_row, rows);
     return all;

@@ -1,5 +1,6 @@
 #include "io/input_file.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -29,6 +30,19 @@ std::uintmax_t require_readable(const std::filesystem::path& path) {
   return std::filesystem::file_size(path);
 }
 
+std::vector<std::filesystem::path> paths_in(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::vector<std::filesystem::path> paths;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    paths.push_back(entry.path());
+  }
+  if (error) {
+    refuse(folder, "cannot be read: {}; check its permissions", error.message());
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
 std::string hash_of(std::string_view bytes) {
   std::uint64_t hash = 0xcbf29ce484222325;
   for (const char c : bytes) {
@@ -37,14 +51,16 @@ std::string hash_of(std::string_view bytes) {
   return fmt::format("{:016x}", hash);
 }
 
-std::string hash_of_file(const std::filesystem::path& file) {
+std::string read_bytes(const std::filesystem::path& file) {
   require_readable(file);
   std::ifstream stream(file, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   if (!stream) {
     refuse(file, "cannot be read; copy it again");
   }
-  return hash_of(bytes);
+  return bytes;
 }
+
+std::string hash_of_file(const std::filesystem::path& file) { return hash_of(read_bytes(file)); }
 
 }  // namespace palpate

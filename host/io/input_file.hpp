@@ -8,24 +8,21 @@
 #include <string>
 #include <string_view>
 #include <tuple>
+#include <vector>
 
-#include <fmt/format.h>
-
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 
 namespace palpate {
-
-/// Throws Error (Fault::input), "<source>: <message>"; the source is mostly a file, and the message
-/// is formatted as by fmt::format().
-template <typename... Parts>
-[[noreturn]] void refuse(const std::filesystem::path& source,
-                         fmt::format_string<const Parts&...> message, const Parts&... parts) {
-  throw Error(Fault::input, fmt::format("{}: {}", source.string(), fmt::format(message, parts...)));
-}
 
 /// Size in bytes of a regular file that may be read.
 /// @throws Error where it is missing, a folder, not a regular file or not readable.
 std::uintmax_t require_readable(const std::filesystem::path& path);
+
+/// The paths in a folder, sorted. @throws Error where it cannot be read
+std::vector<std::filesystem::path> paths_in(const std::filesystem::path& folder);
+
+/// A file's content. @throws Error as require_readable()
+std::string read_bytes(const std::filesystem::path& file);
 
 /// Hash of bytes, in hexadecimal (FNV-1a, 64 bits): tells files apart that nobody has forged.
 std::string hash_of(std::string_view bytes);

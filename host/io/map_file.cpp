@@ -7,8 +7,10 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <yaml-cpp/yaml.h>
 #include <nlohmann/json.hpp>
 
+#include "io/atomic_file.hpp"
 #include "io/file_format.hpp"
 #include "io/file_summary.hpp"
 #include "io/hdf5_contents.hpp"
@@ -90,15 +92,15 @@ void read_cells(const std::filesystem::path& path, const Hdf5Contents& file,
   });
 }
 
-/// All numbers of a dataset of this shape.
-template <typename Number = double>
-std::vector<Number> read_all(const Hdf5Contents& file, const char* name,
-                             const std::vector<std::uint64_t>& shape,
-                             const char* remedy = "build the map anew") {
+/// All values of a dataset of this shape.
+template <typename Value = double>
+std::vector<Value> read_all(const Hdf5Contents& file, const char* name,
+                            const std::vector<std::uint64_t>& shape,
+                            const char* remedy = "build the map anew") {
   if (file.shape(name) != shape) {
     file.refuse("dataset '{}' has the shape {}, not {}; {}", name, file.shape(name), shape, remedy);
   }
-  return file.read<Number>(name);
+  return file.read<Value>(name);
 }
 
 /// The groups of `touches` touches, as write_groups() wrote them.
@@ -158,29 +160,23 @@ std::shared_ptr<const MapSource> read_source(const std::filesystem::path& path,
     file.refuse("dataset 'touch_pressure' has the shape [{}, {}]; build the map anew", n, e);
   }
   touches.pressure = read_all(file, "touch_pressure", {n, e});
-  const std::vector<double> poses = read_all(file, "touch_pose", {n, 3});
-  for (std::size_t i = 0; i < n; ++i) {
-    touches.T_robot_sensor.push_back({{poses[3 * i], poses[3 * i + 1]}, poses[3 * i + 2]});
-  }
+  touches.T_robot_sensor = read_all<Pose>(file, "touch_pose", {n, 3});
   const bool changes = file.shape("touch_elements").size() == 3;
-  const std::vector<double> elements = changes ? read_all(file, "touch_elements", {n, e, 2})
-                                               : read_all(file, "touch_elements", {e, 2});
-  for (std::size_t k = 0; k < elements.size(); k += 2) {
-    touches.elements_mm.emplace_back(elements[k], elements[k + 1]);
-  }
+  touches.elements_mm = changes ? read_all<glm::dvec2>(file, "touch_elements", {n, e, 2})
+                                : read_all<glm::dvec2>(file, "touch_elements", {e, 2});
+  const auto require = [&](bool is_sound, const char* name, const std::vector<double>& pair) {
+    if (!is_sound) {
+      file.refuse("attribute '{}' is {}, {}; build the map anew", name, pair[0], pair[1]);
+    }
+  };
   if (file.has_attribute("left_out_fit")) {
     const std::vector<double> z = file.numbers("left_out_fit", 2);
-    if (!(z[1] > 0.0)) {
-      file.refuse("attribute 'left_out_fit' has the standard deviation {}; build the map anew",
-                  z[1]);
-    }
+    require(z[1] > 0.0, "left_out_fit", z);
     source->left_out = FitScale{.mean = z[0], .sd = z[1]};
   }
   if (file.has_attribute("pose_scale")) {
     const std::vector<double> scale = file.numbers("pose_scale", 2);
-    if (!(scale[0] > 0.0 && scale[1] >= 0.0)) {
-      file.refuse("attribute 'pose_scale' is {}, {}; build the map anew", scale[0], scale[1]);
-    }
+    require(scale[0] > 0.0 && scale[1] >= 0.0, "pose_scale", scale);
     source->pose_scale = PoseScale{.factor = scale[0], .map_sd_mm = scale[1]};
   }
   if (file.has_attribute("groups")) {
@@ -218,6 +214,30 @@ void write_source(Hdf5Writer& file, const MapSource& source) {
   if (!touches.valid.empty()) {
     file.dataset("touch_valid", {n, e}, touches.valid, compressed);
   }
+}
+
+// map_server's default thresholds, and the grey levels that its map_saver writes.
+constexpr double occupied_threshold = 0.65;
+constexpr double free_threshold = 0.196;
+constexpr char occupied_grey = 0;
+constexpr char free_grey = static_cast<char>(254);
+constexpr char unknown_grey = static_cast<char>(205);
+
+std::string image_of(const OccupancyGrid& map) {
+  std::string image = fmt::format("P5\n{} {}\n255\n", map.nx, map.ny);
+  // Unseen cells hold exactly the prior, which may lie below the free threshold.
+  const auto unseen = static_cast<float>(map.prior_log_odds());
+  for (int j = map.ny - 1; j >= 0; --j) {
+    for (int i = 0; i < map.nx; ++i) {
+      const float log_odds = map.at(i, j);
+      const double p = probability_from_log_odds(log_odds);
+      image += log_odds == unseen       ? unknown_grey
+               : p > occupied_threshold ? occupied_grey
+               : p < free_threshold     ? free_grey
+                                        : unknown_grey;
+    }
+  }
+  return image;
 }
 
 }  // namespace
@@ -269,11 +289,10 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
   if (map.spread_mm) {
     file.attribute("spread_mm", *map.spread_mm);
   }
-  if (map.mirror) {
-    file.attribute("mirror", 1);
-  }
-  if (map.drawn) {
-    file.attribute("drawn", 1);
+  for (const auto& [name, holds] : {std::pair{"mirror", map.mirror}, {"drawn", map.drawn}}) {
+    if (holds) {
+      file.attribute(name, 1);
+    }
   }
   if (map.suggested_symmetry) {
     file.attribute("suggested_symmetry", *map.suggested_symmetry);
@@ -297,6 +316,32 @@ void write_map(const std::filesystem::path& path, const OccupancyGrid& map) {
     write_source(file, *map.source);
   }
   file.save();
+}
+
+void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGrid& map) {
+  if (yaml_path.extension() != ".yaml") {
+    refuse(yaml_path, "is not named as a map_server map; end its name in .yaml");
+  }
+  std::filesystem::path image_path = yaml_path;
+  image_path.replace_extension(".pgm");
+  constexpr double metres_per_mm = 1e-3;
+  // The origin is the corner, not the centre, of the lower left pixel.
+  const glm::dvec2 corner_mm = map.origin_mm - 0.5 * map.cell_mm;
+  YAML::Emitter image_name;  // in quotes where YAML wants them
+  image_name << image_path.filename().string();
+  const std::string yaml = fmt::format(
+      "image: {}\nmode: trinary\nresolution: {:.12g}\norigin: [{:.12g}, {:.12g}, 0]\nnegate: 0\n"
+      "occupied_thresh: {:.12g}\nfree_thresh: {:.12g}\n",
+      image_name.c_str(), map.cell_mm * metres_per_mm, corner_mm.x * metres_per_mm,
+      corner_mm.y * metres_per_mm, occupied_threshold, free_threshold);
+
+  AtomicFile image_file(image_path);
+  AtomicFile yaml_file(yaml_path);
+  image_file.write(image_of(map));
+  yaml_file.write(yaml);
+  // The image first: the YAML that names it must not appear without it.
+  image_file.commit();
+  yaml_file.commit();
 }
 
 }  // namespace palpate

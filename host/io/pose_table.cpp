@@ -1,13 +1,16 @@
 #include "io/pose_table.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
-#include <limits>
 #include <numbers>
+#include <numeric>
 #include <span>
 #include <utility>
 
 #include <fmt/ranges.h>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
 
 #include "model/printable.hpp"
 #include "palpate/touch.hpp"
@@ -17,52 +20,47 @@ namespace palpate {
 namespace {
 
 constexpr double most_turned_rad = 1e9;
+constexpr double rounding = 1e-2;  // three decimals of a log leave less
 
-constexpr std::size_t in_space = 7;  // columns of a position and a quaternion
+std::size_t axis_of(char letter) {
+  return static_cast<std::size_t>(std::tolower(static_cast<unsigned char>(letter)) - 'x');
+}
 
 struct TableColumns {
   std::optional<UnitColumn> time;
   PoseColumns pose;
 };
 
+/// x, y and an angle, or a position and a quaternion, perhaps behind a time.
 TableColumns columns_without_names(const CsvTable& table, const TableOptions& options) {
   const std::size_t count = table.columns().size();
-  const std::size_t of_pose = count >= in_space ? in_space : 3;
-  if (count != of_pose && count != of_pose + 1) {
+  const bool has_time = count == 4 || count == 8;
+  std::vector<std::size_t> indices(has_time ? count - 1 : count);
+  std::iota(indices.begin(), indices.end(), has_time ? 1 : 0);
+  if (indices.size() != 3 && indices.size() != 7) {
     table.refuse(
         "{} columns without names; write x, y, theta or tx, ty, tz, qx, qy, qz, qw, with or "
         "without a time before them, or add a header",
         count);
   }
-  TableColumns columns;
-  columns.pose.form = of_pose == in_space ? PoseForm::quaternion : PoseForm::planar;
-  std::size_t index = 0;
-  if (count > of_pose) {
-    columns.time = unit_column(table, index++, time_units, options);
-  }
-  const std::size_t lengths = of_pose == in_space ? 3 : 2;
-  for (std::size_t i = 0; i < of_pose; ++i, ++index) {
-    columns.pose.columns.push_back(i < lengths ? unit_column(table, index, length_units, options)
-                                   : of_pose == in_space
-                                       ? UnitColumn{.index = index}
-                                       : unit_column(table, index, angle_units, options));
-  }
-  return columns;
+  const PoseForm form = indices.size() == 3 ? PoseForm::planar : PoseForm::quaternion;
+  return {has_time ? std::optional(unit_column(table, 0, time_units, options)) : std::nullopt,
+          pose_columns(table, form, indices, options)};
 }
 
 TableColumns find_columns(const CsvTable& table, const TableOptions& options) {
   PoseColumns pose = find_pose(table, options);
-  if (!pose.columns.empty()) {
-    return {find_time(table, options), std::move(pose)};
-  }
-  if (!table.has_header()) {
+  if (pose.columns.empty() && !table.has_header()) {
     return columns_without_names(table, options);
   }
-  table.refuse_columns("has no columns 'x', 'y' and 'theta'; rename its columns{}",
-                       options.may_name_poses
-                           ? ", or name them by `pose-columns`: X,Y,THETA, or in space "
-                             "X,Y,Z,ROLL,PITCH,YAW or TX,TY,TZ,QX,QY,QZ,QW"
-                           : "");
+  if (pose.columns.empty()) {
+    table.refuse_columns("has no columns 'x', 'y' and 'theta'; rename its columns{}",
+                         options.may_name_poses
+                             ? ", or name them by `pose-columns`: X,Y,THETA, or in space "
+                               "X,Y,Z,ROLL,PITCH,YAW or TX,TY,TZ,QX,QY,QZ,QW"
+                             : "");
+  }
+  return {find_time(table, options), std::move(pose)};
 }
 
 /// The columns of these names that are no part of the pose.
@@ -130,7 +128,6 @@ std::optional<std::vector<double>> numbers_in(const CsvTable& table,
 std::optional<SpatialPose> pose_of_quaternion(const CsvTable& table, std::span<const double> v) {
   const glm::dquat rotation(v[6], v[3], v[4], v[5]);
   const double length = glm::length(rotation);
-  constexpr double rounding = 1e-2;  // three decimals of a log leave less
   if (length == 0.0) {
     return {};
   }
@@ -143,118 +140,159 @@ std::optional<SpatialPose> pose_of_quaternion(const CsvTable& table, std::span<c
   return SpatialPose{{v[0], v[1], v[2]}, rotation / length};
 }
 
-/// Reads the rotations of a table's rows.
-class SpatialReader {
- public:
-  SpatialReader(const std::filesystem::path& path, const TableOptions& options,
-                const PoseColumns& pose)
-      : pose_(pose), axes_(options.euler.empty() ? "xyz" : options.euler) {
-    if (pose.form == PoseForm::matrix) {
-      by_columns_ =
-          options.matrix.empty() ? is_by_columns(path, options) : options.matrix == "columns";
-    }
+/// The pose that a matrix tells; none where the numbers are no rotation and position.
+/// @param in_mm numbers in the unit of the position, which is not that of the rotation
+std::optional<SpatialPose> matrix_of(const PoseColumns& columns, std::span<const double> in_mm,
+                                     bool by_columns) {
+  const Unit& unit = columns.columns.front().unit;
+  std::vector<double> numbers(in_mm.begin(), in_mm.end());
+  for (double& number : numbers) {
+    number *= unit.divisor / unit.multiplier;
   }
-
-  std::optional<SpatialPose> read(const CsvTable& table) const {
-    const auto numbers = numbers_in(table, pose_.columns);
-    if (!numbers) {
-      return {};
-    }
-    const std::vector<double>& v = *numbers;
-    switch (pose_.form) {
-      case PoseForm::euler:
-        return SpatialPose{{v[0], v[1], v[2]}, rotation_of_angles(axes_, std::span(v).subspan(3))};
-      case PoseForm::rotation_vector:
-        return SpatialPose{{v[0], v[1], v[2]}, rotation_of_vector({v[3], v[4], v[5]})};
-      case PoseForm::matrix:
-        return pose_in_matrix(table, v);
-      default:
-        return pose_of_quaternion(table, v);
-    }
+  auto pose = pose_of_matrix(numbers, by_columns);
+  if (pose) {
+    pose->translation_mm *= unit.multiplier / unit.divisor;
   }
+  return pose;
+}
 
-  /// What the columns are, in a sentence.
-  std::string words(const CsvTable& table) const {
-    const char* position = "its poses are x, y, z and ";
-    std::string form;
-    switch (pose_.form) {
-      case PoseForm::euler:
-        form = fmt::format("{}angles about the {} axes {} one after another (`euler`)", position,
-                           axes_[0] >= 'x' ? "fixed" : "moving", axes_);
-        break;
-      case PoseForm::rotation_vector:
-        form = fmt::format("{}a rotation vector", position);
-        break;
-      case PoseForm::matrix:
-        form = fmt::format("its poses are matrices written by {} (`matrix`)",
-                           by_columns_ ? "columns" : "rows");
-        break;
-      default:
-        form = fmt::format("{}a quaternion", position);
-    }
-    const auto name = [&](const UnitColumn& column) {
-      return printable(table.columns()[column.index]);
-    };
-    const bool has_angles =
-        pose_.form == PoseForm::euler || pose_.form == PoseForm::rotation_vector;
-    return fmt::format("{}, columns '{}' to '{}', in {}{}", form, name(pose_.columns.front()),
-                       name(pose_.columns.back()), pose_.columns.front().unit.name,
-                       has_angles ? fmt::format(" and {}", pose_.columns.back().unit.name) : "");
+/// Whether matrices are written by columns, by the first row that only one of the two ways makes a
+/// pose.
+bool is_by_columns(const std::filesystem::path& path, const PoseColumns& columns,
+                   const TableOptions& options) {
+  if (columns.form != PoseForm::matrix || !options.matrix.empty()) {
+    return options.matrix == "columns";
   }
-
- private:
-  /// None where the numbers are no rotation and position.
-  std::optional<SpatialPose> matrix_of(std::span<const double> in_mm, bool by_columns) const {
-    // The position's unit is not that of the rotation's numbers.
-    const Unit& unit = pose_.columns.front().unit;
-    std::vector<double> numbers(in_mm.begin(), in_mm.end());
-    for (double& number : numbers) {
-      number *= unit.divisor / unit.multiplier;
+  CsvTable table = open_table(path, options);
+  while (table.next()) {
+    const auto numbers = numbers_in(table, columns.columns);
+    const bool by_columns = numbers && matrix_of(columns, *numbers, true);
+    const bool by_rows = numbers && matrix_of(columns, *numbers, false);
+    if (by_columns != by_rows) {
+      return by_columns;
     }
-    auto pose = pose_of_matrix(numbers, by_columns);
-    if (pose) {
-      pose->translation_mm *= unit.multiplier / unit.divisor;
-    }
-    return pose;
-  }
-
-  SpatialPose pose_in_matrix(const CsvTable& table, std::span<const double> in_mm) const {
-    const auto pose = matrix_of(in_mm, by_columns_);
-    if (!pose) {
+    if (numbers && !by_columns) {
       table.refuse(
-          "the numbers are no rotation and position, read by {}; correct them, or give `matrix {}`",
-          by_columns_ ? "columns" : "rows", by_columns_ ? "rows" : "columns");
+          "the numbers are no rotation and position, read by columns or by rows; name the 12 or "
+          "16 columns of the matrix in its order");
     }
-    return *pose;
   }
+  refuse(path,
+         "its matrices may be written by columns or by rows; give `matrix columns` or "
+         "`matrix rows`");
+}
 
-  /// Finds the first row that only one of the two ways makes a pose.
-  bool is_by_columns(const std::filesystem::path& path, const TableOptions& options) const {
-    CsvTable table = open_table(path, options);
-    while (table.next()) {
-      const auto numbers = numbers_in(table, pose_.columns);
-      const bool by_columns = numbers && matrix_of(*numbers, true);
-      const bool by_rows = numbers && matrix_of(*numbers, false);
-      if (by_columns != by_rows) {
-        return by_columns;
-      }
-      if (numbers && !by_columns) {
-        table.refuse(
-            "the numbers are no rotation and position, read by columns or by rows; name the 12 or "
-            "16 columns of the matrix in its order");
-      }
-    }
-    refuse(path,
-           "its matrices may be written by columns or by rows; give `matrix columns` or "
-           "`matrix rows`");
-  }
-
-  const PoseColumns& pose_;
-  std::string axes_;
-  bool by_columns_ = true;
+/// How the rotations of poses in space are written.
+struct RotationRules {
+  std::string axes;  ///< of three angles
+  bool by_columns;   ///< of matrices
 };
 
+/// The row's pose in space; none where its cells are empty.
+std::optional<SpatialPose> spatial_pose(const CsvTable& table, const PoseColumns& columns,
+                                        const RotationRules& rules) {
+  const auto numbers = numbers_in(table, columns.columns);
+  if (!numbers) {
+    return {};
+  }
+  const std::vector<double>& v = *numbers;
+  switch (columns.form) {
+    case PoseForm::euler:
+      return SpatialPose{{v[0], v[1], v[2]},
+                         rotation_of_angles(rules.axes, std::span(v).subspan(3))};
+    case PoseForm::rotation_vector:
+      return SpatialPose{{v[0], v[1], v[2]}, rotation_of_vector({v[3], v[4], v[5]})};
+    case PoseForm::matrix: {
+      const auto pose = matrix_of(columns, v, rules.by_columns);
+      if (!pose) {
+        table.refuse(
+            "the numbers are no rotation and position, read by {}; correct them, or give "
+            "`matrix {}`",
+            rules.by_columns ? "columns" : "rows", rules.by_columns ? "rows" : "columns");
+      }
+      return pose;
+    }
+    default:
+      return pose_of_quaternion(table, v);
+  }
+}
+
+/// What the columns of poses are, in a sentence; "" of x, y, theta and of quaternions.
+std::string words_about(const CsvTable& table, const PoseColumns& columns,
+                        const RotationRules& rules) {
+  std::string form;
+  switch (columns.form) {
+    case PoseForm::euler:
+      form = fmt::format(
+          "its poses are x, y, z and angles about the {} axes {} one after another (`euler`)",
+          rules.axes[0] >= 'x' ? "fixed" : "moving", rules.axes);
+      break;
+    case PoseForm::rotation_vector:
+      form = "its poses are x, y, z and a rotation vector";
+      break;
+    case PoseForm::matrix:
+      form = fmt::format("its poses are matrices written by {} (`matrix`)",
+                         rules.by_columns ? "columns" : "rows");
+      break;
+    default:
+      return "";
+  }
+  const UnitColumn& first = columns.columns.front();
+  const UnitColumn& last = columns.columns.back();
+  return fmt::format(
+      "{}, columns '{}' to '{}', in {}{}", form, printable(table.columns()[first.index]),
+      printable(table.columns()[last.index]), first.unit.name,
+      columns.form == PoseForm::matrix ? "" : fmt::format(" and {}", last.unit.name));
+}
+
 }  // namespace
+
+SpatialPose operator*(const SpatialPose& a, const SpatialPose& b) {
+  return {a.translation_mm + a.rotation * b.translation_mm, a.rotation * b.rotation};
+}
+
+glm::dquat rotation_of_angles(std::string_view axes, std::span<const double> rad) {
+  glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    glm::dvec3 axis{0.0};
+    axis[static_cast<int>(axis_of(axes[i]))] = 1.0;
+    const glm::dquat turn = rotation_of_vector(rad[i] * axis);
+    const bool is_fixed = std::islower(static_cast<unsigned char>(axes[i])) != 0;
+    rotation = is_fixed ? turn * rotation : rotation * turn;
+  }
+  return rotation;
+}
+
+glm::dquat rotation_of_vector(const glm::dvec3& v) {
+  const double angle = glm::length(v);
+  return angle == 0.0 ? glm::dquat(1.0, 0.0, 0.0, 0.0) : glm::angleAxis(angle, v / angle);
+}
+
+std::optional<SpatialPose> pose_of_matrix(std::span<const double> numbers, bool by_columns) {
+  const std::size_t rows = numbers.size() / 4;  // of four columns
+  const auto at = [&](std::size_t row, std::size_t column) {
+    return by_columns ? numbers[column * rows + row] : numbers[row * 4 + column];
+  };
+  glm::dmat3 r;
+  SpatialPose pose;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      r[column][row] = at(static_cast<std::size_t>(row), static_cast<std::size_t>(column));
+    }
+    pose.translation_mm[row] = at(static_cast<std::size_t>(row), 3);
+  }
+  bool is_one = std::abs(glm::determinant(r) - 1.0) <= rounding;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      is_one = is_one && std::abs(glm::dot(r[i], r[j]) - (i == j ? 1.0 : 0.0)) <= rounding;
+    }
+  }
+  for (std::size_t column = 0; column < 4 && rows == 4; ++column) {
+    is_one = is_one && at(3, column) == (column == 3 ? 1.0 : 0.0);
+  }
+  pose.rotation = glm::normalize(glm::quat_cast(r));
+  return is_one ? std::optional(pose) : std::nullopt;
+}
 
 PoseTable read_poses(const std::filesystem::path& path, const TableOptions& options,
                      bool with_times) {
@@ -277,12 +315,13 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
           printable(table.columns()[height.index])));
     }
   }
-  const SpatialReader spatial(path, options, pose);
+  const RotationRules rules{options.euler.empty() ? "xyz" : options.euler,
+                            is_by_columns(path, pose, options)};
   if (table.skipped_lines() > 0) {
     poses.understood.push_back(skipped_words(table));
   }
-  if (!pose.are_usual) {
-    poses.understood.push_back(spatial.words(table));
+  if (std::string words = words_about(table, pose, rules); !words.empty()) {
+    poses.understood.push_back(std::move(words));
   }
   TableTimes times(table, time.value_or(UnitColumn()));
   std::uint64_t repeated = 0;
@@ -301,7 +340,7 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
       poses.T_robot_sensor.push_back(numbers ? Pose{{(*numbers)[0], (*numbers)[1]}, (*numbers)[2]}
                                              : unknown_pose);
     } else {
-      poses.spatial.push_back(spatial.read(table));
+      poses.spatial.push_back(spatial_pose(table, pose, rules));
     }
   }
   if (poses.T_robot_sensor.empty() && poses.spatial.empty()) {

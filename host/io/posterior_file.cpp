@@ -243,11 +243,9 @@ void write_posterior(const std::filesystem::path& path, const std::vector<std::s
 }
 
 void write_posterior(const std::filesystem::path& path, const Posterior& posterior) {
-  const std::vector<std::string>& objects = posterior.objects;
-  const PoseLattice& lattice = posterior.lattice;
-  const std::vector<double>& logs = posterior.log_likelihood;
+  const auto& [objects, lattice, logs, rest_mass_bound, index] = posterior;
   validate(path, objects, lattice);
-  if (posterior.rest_mass_bound) {
+  if (rest_mass_bound) {
     write_evaluated(path, posterior);
     return;
   }

@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
-#include "io/column_choice.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "model/stream_time.hpp"
@@ -18,16 +18,6 @@ namespace {
 
 constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double before_all = -std::numeric_limits<double>::infinity();
-
-std::optional<std::size_t> find_one_of(const CsvTable& table,
-                                       std::initializer_list<std::string_view> names) {
-  for (const std::string_view name : names) {
-    if (const auto found = table.find(name)) {
-      return found;
-    }
-  }
-  return {};
-}
 
 /// Returns a whole number, at least 0, in a cell of the row.
 std::uint64_t count_in(const CsvTable& table, std::size_t column, std::uint64_t limit,
@@ -64,9 +54,7 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
   const std::vector<UnitColumn> pose = find_pose(table, options).columns;
   std::vector<std::size_t> taken;
   const auto take = [&](const std::optional<std::size_t>& column) {
-    if (column) {
-      taken.push_back(*column);
-    }
+    taken.insert(taken.end(), column ? 1 : 0, column.value_or(0));
   };
   take(device_time);
   take(lost_before);
@@ -159,9 +147,12 @@ double frame_in(const CsvTable& table, std::size_t column, double last) {
 /// pressures.
 std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
                                        const TableOptions& options) {
-  const auto element_column = find_one_of(table, {"element", "taxel"});
-  const auto pressure_column = find_one_of(table, {"pressure", "pressure_kpa", "value"});
-  const auto frame_column = find_one_of(table, {"frame", "touch"});
+  const auto find = [&](std::string_view names) {
+    return find_column(table, names, no_unit, options);
+  };
+  const auto element_column = find("element taxel");
+  const auto pressure_column = find("pressure pressure_kpa value");
+  const auto frame_column = find("frame touch");
   const auto time = find_time(table, options);
   if (!element_column || !pressure_column) {
     return {};
@@ -182,7 +173,8 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
   std::vector<bool> read(elements);
   TableTimes times(table, time.value_or(UnitColumn()));
   while (table.next()) {
-    const double key = time ? times.next(all.time_s.size()) : frame_in(table, *frame_column, last);
+    const double key =
+        time ? times.next(all.time_s.size()) : frame_in(table, frame_column->index, last);
     if (key != last) {
       all.pressure.insert(all.pressure.end(), elements, unknown_number);
       read.assign(elements, false);
@@ -191,14 +183,14 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
       }
       last = key;
     }
-    const auto element = count_in(table, *element_column, elements - 1, remedy.c_str());
+    const auto element = count_in(table, element_column->index, elements - 1, remedy.c_str());
     if (read[element]) {
       table.refuse("element {} has two readings {}; leave one out", element,
                    time ? "at one time" : "in one frame");
     }
     read[element] = true;
     all.pressure[all.pressure.size() - elements + element] =
-        table.number(*pressure_column).value_or(unknown_number);
+        table.number(pressure_column->index).value_or(unknown_number);
   }
   all.steps = std::move(times.steps);
   return all;
@@ -246,13 +238,13 @@ PressureTable read_pressures(const std::filesystem::path& path, std::size_t elem
   return *std::move(pressures);
 }
 
-ArrayTable read_array(const std::filesystem::path& path) {
+Recording read_array(const std::filesystem::path& path) {
   CsvTable table(path);
   const UnitColumn x = find_axis(table, 0);
   const UnitColumn y = find_axis(table, 1);
   const auto valid = table.find("valid");
   const auto baseline = table.find("baseline");
-  ArrayTable array;
+  Recording array;
   while (table.next()) {
     array.elements_mm.emplace_back(coordinate(table, x), coordinate(table, y));
     if (valid) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <iterator>
 #include <utility>
 
@@ -51,22 +50,6 @@ std::vector<SetupFinding> read_findings(const Hdf5Contents& file) {
     file.refuse("attribute 'findings' is no JSON array of what, nats, words and option; delete it");
   }
   return findings;
-}
-
-/// Reads rows of tuples of numbers.
-template <typename Tuple>
-void read_tuples(const Hdf5Contents& file, const char* name, std::uint64_t first,
-                 std::uint64_t count, std::vector<Tuple>& tuples) {
-  constexpr std::size_t number_bytes = sizeof(double);
-  constexpr std::size_t width = sizeof(Tuple) / number_bytes;
-  tuples.clear();
-  tuples.reserve(file.size(name, first, count) / width);
-  const auto take = [&](std::uint64_t, std::span<const double> numbers) {
-    const std::size_t before = tuples.size();
-    tuples.resize(before + numbers.size() / width);
-    std::memcpy(static_cast<void*>(&tuples[before]), numbers.data(), numbers.size_bytes());
-  };
-  file.read(name, take, first, count);
 }
 
 // Checks the sizes of a recording that is about to be written.
@@ -202,52 +185,44 @@ void RecordingFile::read_elements() {
     }
   }
   if (!head_.array_changes) {
-    read_tuples(*file_, "elements", 0, e, r.elements_mm);
+    r.elements_mm = file_->read<glm::dvec2>("elements");
     require_elements(path_, 0, r.elements_mm);
   }
 }
 
 void RecordingFile::read(std::uint64_t first, std::uint64_t count, Recording& rows) const {
-  const auto read_list = [&](const char* name, std::vector<double>& list) {
-    list.clear();
+  const auto read_list = [&]<typename Value>(const char* name, std::vector<Value>& list) {
+    list = std::vector<Value>();  // frees the rows before
     if (file_->has_dataset(name)) {
-      read_tuples(*file_, name, first, count, list);
+      list = file_->read<Value>(name, first, count);
     }
   };
   read_list("pressure", rows.pressure);
-  if (file_->has_dataset("sensor_pose")) {
-    read_tuples(*file_, "sensor_pose", first, count, rows.T_robot_sensor);
-  } else {
+  read_list("sensor_pose", rows.T_robot_sensor);
+  if (!file_->has_dataset("sensor_pose")) {
     rows.T_robot_sensor.assign(count, unknown_pose);  // a stream without poses
   }
   if (head_.array_changes) {
-    read_tuples(*file_, "elements", first, count, rows.elements_mm);
+    read_list("elements", rows.elements_mm);
   }
   read_list("time", rows.time_s);
   read_list("device_time", rows.device_time_s);
-  rows.lost_before = counts(first, count);
-  require_rows(path_, head_.recording, head_.elements, rows, first);
-}
-
-/// Rows of the counts of lost frames, where the file has them.
-std::vector<std::uint64_t> RecordingFile::counts(std::uint64_t first, std::uint64_t count) const {
-  std::vector<std::uint64_t> counts;
-  if (!file_->has_dataset("lost_before")) {
-    return counts;
-  }
-  counts.reserve(file_->size("lost_before", first, count));
-  const auto take = [&](std::uint64_t, std::span<const double> values) {
+  rows.lost_before.clear();
+  const auto take_lost = [&](std::uint64_t, std::span<const double> values) {
     for (const double value : values) {
       if (!(value >= 0.0 && value <= static_cast<double>(largest_count) &&
             value == std::floor(value))) {
         file_->refuse("dataset 'lost_before' holds {}; store counts of frames up to {}", value,
                       largest_count);
       }
-      counts.push_back(static_cast<std::uint64_t>(value));
+      rows.lost_before.push_back(static_cast<std::uint64_t>(value));
     }
   };
-  file_->read("lost_before", take, first, count);
-  return counts;
+  if (file_->has_dataset("lost_before")) {
+    rows.lost_before.reserve(file_->size("lost_before", first, count));
+    file_->read("lost_before", take_lost, first, count);
+  }
+  require_rows(path_, head_.recording, head_.elements, rows, first);
 }
 
 /// The dataset's shape without incomplete rows.

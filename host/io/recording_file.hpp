@@ -40,7 +40,6 @@ class RecordingFile {
   std::uint64_t complete_rows() const;
   std::vector<std::uint64_t> shape_of(const char* name) const;
   bool has(const char* name, const std::vector<std::vector<std::uint64_t>>& fitting) const;
-  std::vector<std::uint64_t> counts(std::uint64_t first, std::uint64_t count) const;
 
   std::filesystem::path path_;
   std::unique_ptr<const Hdf5Contents> file_;

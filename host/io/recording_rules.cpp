@@ -1,6 +1,8 @@
 #include "io/recording_rules.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -108,24 +110,23 @@ void require_rows(const std::filesystem::path& path, const Recording& head, std:
   require_pressures(path, head, elements, first_row, rows.pressure);
   require_poses(path, head.rows == "frames", first_row, rows.T_robot_sensor);
   require_elements(path, first_row * elements, rows.elements_mm);
-  for (std::size_t i = 0; i < rows.time_s.size(); ++i) {
-    if (!std::isfinite(rows.time_s[i])) {
-      refuse(path, "dataset 'time'[{}] = {}; store seconds since the Unix epoch", first_row + i,
-             rows.time_s[i]);
+  const auto require = [&](const char* name, const auto& list, const auto& is_sound,
+                           const std::string& remedy) {
+    const auto found = std::ranges::find_if_not(list, is_sound);
+    if (found != list.end()) {
+      refuse(path, "dataset '{}'[{}] = {}; {}", name,
+             first_row + static_cast<std::size_t>(found - list.begin()), *found, remedy);
     }
-  }
-  for (std::size_t i = 0; i < rows.device_time_s.size(); ++i) {
-    if (std::isinf(rows.device_time_s[i])) {
-      refuse(path, "dataset 'device_time'[{}] = {}; store seconds, or NaN where they are unknown",
-             first_row + i, rows.device_time_s[i]);
-    }
-  }
-  for (std::size_t i = 0; i < rows.lost_before.size(); ++i) {
-    if (rows.lost_before[i] > largest_count) {
-      refuse(path, "dataset 'lost_before'[{}] = {}; store counts up to {}", first_row + i,
-             rows.lost_before[i], largest_count);
-    }
-  }
+  };
+  require(
+      "time", rows.time_s, [](double time_s) { return std::isfinite(time_s); },
+      "store seconds since the Unix epoch");
+  require(
+      "device_time", rows.device_time_s, [](double time_s) { return !std::isinf(time_s); },
+      "store seconds, or NaN where they are unknown");
+  require(
+      "lost_before", rows.lost_before, [](std::uint64_t lost) { return lost <= largest_count; },
+      fmt::format("store counts up to {}", largest_count));
 }
 
 }  // namespace palpate

@@ -33,8 +33,6 @@ bool is_marked_open(const std::filesystem::path& path) {
          bytes[flags] != 0;
 }
 
-void mark_as_being_recorded(int descriptor) { ::flock(descriptor, LOCK_SH | LOCK_NB); }
-
 Recorder recorder_of(const std::filesystem::path& path) {
   const Descriptor file(path, O_RDONLY);
   if (file.valid() && ::flock(file.get(), LOCK_EX | LOCK_NB) == 0) {
@@ -93,14 +91,12 @@ Descriptor lock(const std::filesystem::path& path) {
   if (::flock(file.get(), LOCK_EX | LOCK_NB) == 0) {
     return file;
   }
-  if (errno == EWOULDBLOCK) {
-    refuse(path,
-           "cannot be closed: another program has it open, which may be recording it; wait "
-           "until it is done");
-  }
-  refuse(path,
-         "cannot be closed: its file system has no locks, which tell whether it is being "
-         "recorded; copy it to another disk first");
+  refuse(path, "cannot be closed: {}",
+         errno == EWOULDBLOCK
+             ? "another program has it open, which may be recording it; wait until "
+               "it is done"
+             : "its file system has no locks, which tell whether it is being "
+               "recorded; copy it to another disk first");
 }
 
 }  // namespace

@@ -8,11 +8,6 @@ namespace palpate {
 /// recorder was killed.
 bool is_marked_open(const std::filesystem::path& path);
 
-/// Marks the file as being recorded, by a lock that lasts while this process has the descriptor
-/// open and keeps other locking programs from changing the file. Does nothing where the file system
-/// has no locks.
-void mark_as_being_recorded(int descriptor);
-
 /// State of the recorder of a file that is_marked_open().
 enum class Recorder { there, gone, unknown };
 

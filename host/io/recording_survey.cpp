@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <span>
+#include <string>
 #include <utility>
-
-#include <fmt/format.h>
 
 #include "model/stream_time.hpp"
 #include "palpate/contact.hpp"
@@ -19,14 +19,6 @@ namespace palpate {
 namespace {
 
 constexpr std::uint32_t sign = 0x80000000;
-
-/// A digest of numbers in order, by one more number (the finaliser of SplitMix64).
-std::uint64_t digest_with(std::uint64_t digest, double number) {
-  digest = (digest ^ std::bit_cast<std::uint64_t>(number)) + 0x9E3779B97F4A7C15;
-  digest = (digest ^ (digest >> 30)) * 0xBF58476D1CE4E5B9;
-  digest = (digest ^ (digest >> 27)) * 0x94D049BB133111EB;
-  return digest ^ (digest >> 31);
-}
 
 // Numbers that the rows held at a time have at most, unless one row has more: 4 MiB.
 constexpr std::uint64_t block = 1 << 19;
@@ -71,14 +63,9 @@ class Survey {
     const Pose& pose = rows.T_robot_sensor[i];
     take_pose(pose);
     if (felt && head_.rows != "frames") {
-      std::uint64_t digest = 0;
-      for (const double pressure : std::span(rows.pressure).subspan(i * e_, e_)) {
-        digest = digest_with(digest, pressure);
-      }
-      for (const double part : {pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad}) {
-        digest = digest_with(digest, part);
-      }
-      touches_.push_back(digest);
+      std::string touch(reinterpret_cast<const char*>(&rows.pressure[i * e_]), e_ * sizeof(double));
+      touch.append(reinterpret_cast<const char*>(&pose), sizeof pose);
+      touches_.push_back(std::hash<std::string>()(touch));
     }
     if (!rows.time_s.empty()) {
       take_time(row, rows.time_s[i]);
@@ -194,10 +181,10 @@ class Survey {
   const Recording& head_ = file_.head().recording;
   std::size_t e_ = file_.head().elements;
   RecordingSurvey result_;
-  std::uint64_t last_at_most_ = 0;      ///< last row with the largest reading
-  std::vector<std::uint64_t> touches_;  ///< digests of the touches in contact
-  std::vector<glm::dvec2> places_mm_;   ///< of the living elements in the first row
-  std::vector<std::size_t> placed_;     ///< their indices in the array
+  std::uint64_t last_at_most_ = 0;     ///< last row with the largest reading
+  std::vector<std::size_t> touches_;   ///< hashes of the touches in contact
+  std::vector<glm::dvec2> places_mm_;  ///< of the living elements in the first row
+  std::vector<std::size_t> placed_;    ///< their indices in the array
   StreamTime time_;
   std::optional<double> last_s_;
 };

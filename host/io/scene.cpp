@@ -1,4 +1,4 @@
-#include "palpate/scene.hpp"
+#include "palpate/files.hpp"
 
 #include <fstream>
 #include <optional>
@@ -65,14 +65,6 @@ Scene::Object read_object(const Entry& entry) {
   return object;
 }
 
-std::vector<Scene::Object> read_objects(const Entry& entry) {
-  std::vector<Scene::Object> objects;
-  for (const Entry& object : entry.list("give a list of {map: FILE}")) {
-    objects.push_back(read_object(object));
-  }
-  return objects;
-}
-
 /// The option's value as a flag has it: a list's numbers are joined as in "25x25x16".
 std::string text_of(const Entry& entry, const Option& option) {
   const std::optional<char> separator = separator_of(option);
@@ -123,7 +115,11 @@ Scene read_scene(const std::filesystem::path& path) {
       return;  // comments alone: everything is left out
     }
     YamlKeys keys{{"array", [&](const Entry& e) { read_array(e, scene); }},
-                  {"objects", [&](const Entry& e) { scene.objects = read_objects(e); }}};
+                  {"objects", [&](const Entry& e) {
+                     for (const Entry& object : e.list("give a list of {map: FILE}")) {
+                       scene.objects.push_back(read_object(object));
+                     }
+                   }}};
     for (const char* section : {"region", "touch_sd", "slip_sd"}) {
       keys.emplace_back(section, [&scene, section](const Entry& entry) {
         YamlKeys inner;

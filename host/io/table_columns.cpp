@@ -6,8 +6,6 @@
 
 #include <fmt/ranges.h>
 
-#include "io/column_choice.hpp"
-#include "io/spatial_pose.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 
@@ -15,7 +13,6 @@ namespace palpate {
 
 namespace {
 
-constexpr Unit no_unit[] = {{""}};
 constexpr Unit metres[] = {{"m", 1e3, 1.0}};
 constexpr Unit radians[] = {{"rad"}};
 
@@ -27,21 +24,35 @@ struct Quantity {
 
 // rostopic echo -p names its times %time.
 constexpr std::string_view names_of_time = "time timestamp stamp t %time";
-constexpr Quantity theta{"theta yaw", angle_units};
-constexpr Quantity planar_position[] = {{"x", length_units}, {"y", length_units}};
 constexpr Quantity position[] = {
     {"tx x position.x pose.position.x field.pose.position.x", length_units},
     {"ty y position.y pose.position.y field.pose.position.y", length_units},
     {"tz z position.z pose.position.z field.pose.position.z", length_units}};
-constexpr Quantity quaternion[] = {
-    {"qx orientation.x pose.orientation.x field.pose.orientation.x", no_unit},
-    {"qy orientation.y pose.orientation.y field.pose.orientation.y", no_unit},
-    {"qz orientation.z pose.orientation.z field.pose.orientation.z", no_unit},
-    {"qw orientation.w pose.orientation.w field.pose.orientation.w", no_unit}};
-constexpr Quantity roll_pitch_yaw[] = {
-    {"roll", angle_units}, {"pitch", angle_units}, {"yaw", angle_units}};
-constexpr Quantity rotation_vector[] = {
-    {"rx", angle_units}, {"ry", angle_units}, {"rz", angle_units}};
+
+/// What the numbers of a pose are; a matrix has no usual names, and its position is a length.
+std::vector<Quantity> quantities_of(PoseForm form) {
+  std::vector<Quantity> all(std::begin(position), std::end(position));
+  const auto add = [&](std::initializer_list<Quantity> rotation) {
+    all.insert(all.end(), rotation);
+    return all;
+  };
+  switch (form) {
+    case PoseForm::planar:
+      return {{"x", length_units}, {"y", length_units}, {"theta yaw", angle_units}};
+    case PoseForm::quaternion:
+      return add({{"qx orientation.x pose.orientation.x field.pose.orientation.x", no_unit},
+                  {"qy orientation.y pose.orientation.y field.pose.orientation.y", no_unit},
+                  {"qz orientation.z pose.orientation.z field.pose.orientation.z", no_unit},
+                  {"qw orientation.w pose.orientation.w field.pose.orientation.w", no_unit}});
+    case PoseForm::euler:
+      return add({{"roll", angle_units}, {"pitch", angle_units}, {"yaw", angle_units}});
+    case PoseForm::rotation_vector:
+      return add({{"rx", angle_units}, {"ry", angle_units}, {"rz", angle_units}});
+    case PoseForm::matrix:
+      break;
+  }
+  return std::vector<Quantity>(16, position[0]);
+}
 
 /// Names of units that stand for the units above.
 constexpr std::pair<std::string_view, std::string_view> spellings[] = {
@@ -78,21 +89,6 @@ NameParts parts_of(std::string_view name, std::span<const Unit> units) {
   return unit ? NameParts{name.substr(0, line), unit} : NameParts{name, {}};
 }
 
-/// Adds the columns of the quantities; false, and none added, unless the table has all.
-bool add_all(const CsvTable& table, std::span<const Quantity> quantities,
-             const TableOptions& options, std::vector<UnitColumn>& columns) {
-  std::vector<UnitColumn> found;
-  for (const Quantity& quantity : quantities) {
-    const auto column = find_column(table, quantity.names, quantity.units, options);
-    if (!column) {
-      return false;
-    }
-    found.push_back(*column);
-  }
-  columns.insert(columns.end(), found.begin(), found.end());
-  return true;
-}
-
 /// The columns whose names are `stem` and so many numbers from 0 on, as robots name the parts of a
 /// pose: in metres and radians.
 std::vector<UnitColumn> counted_columns(const CsvTable& table, std::string_view stem,
@@ -111,85 +107,75 @@ std::vector<UnitColumn> counted_columns(const CsvTable& table, std::string_view 
   return columns;
 }
 
-PoseColumns usual_pose(const CsvTable& table, const TableOptions& options) {
-  PoseColumns pose;
-  const auto has = [&](PoseForm form, std::span<const Quantity> where,
-                       std::span<const Quantity> rotation) {
-    std::vector<UnitColumn> columns;
-    const bool found =
-        add_all(table, where, options, columns) && add_all(table, rotation, options, columns);
-    if (found) {
-      pose = {.form = form,
-              .columns = std::move(columns),
-              .are_usual = form == PoseForm::planar || form == PoseForm::quaternion};
+/// The columns that have the usual names of a pose of this form; none unless the table has all.
+std::vector<UnitColumn> usual_columns(const CsvTable& table, PoseForm form,
+                                      const TableOptions& options) {
+  std::vector<UnitColumn> columns;
+  for (const Quantity& quantity : quantities_of(form)) {
+    const auto column = find_column(table, quantity.names, quantity.units, options);
+    if (!column) {
+      return {};
     }
-    return found;
-  };
-  if (has(PoseForm::euler, position, roll_pitch_yaw) ||
-      has(PoseForm::planar, planar_position, std::span(&theta, 1)) ||
-      has(PoseForm::quaternion, position, quaternion) ||
-      has(PoseForm::rotation_vector, position, rotation_vector)) {
-    return pose;
+    columns.push_back(*column);
   }
-  pose.are_usual = false;
-  pose.form = PoseForm::rotation_vector;  // of Universal Robots' RTDE
-  pose.columns = counted_columns(table, "actual_TCP_pose", 6);
-  if (pose.columns.empty()) {
-    pose.form = PoseForm::matrix;  // of libfranka
-    pose.columns = counted_columns(table, "O_T_EE", 16);
-    std::ranges::for_each(pose.columns, [](UnitColumn& column) { column.unit = metres[0]; });
+  return columns;
+}
+
+PoseColumns usual_pose(const CsvTable& table, const TableOptions& options) {
+  for (const PoseForm form :
+       {PoseForm::euler, PoseForm::planar, PoseForm::quaternion, PoseForm::rotation_vector}) {
+    if (auto columns = usual_columns(table, form, options); !columns.empty()) {
+      return {form, std::move(columns)};
+    }
   }
+  // Universal Robots' RTDE, and libfranka.
+  if (auto columns = counted_columns(table, "actual_TCP_pose", 6); !columns.empty()) {
+    return {PoseForm::rotation_vector, std::move(columns)};
+  }
+  PoseColumns pose{PoseForm::matrix, counted_columns(table, "O_T_EE", 16)};
+  std::ranges::for_each(pose.columns, [](UnitColumn& column) { column.unit = metres[0]; });
   return pose;
 }
 
 PoseColumns named_pose(const CsvTable& table, const TableOptions& options) {
+  constexpr std::pair<std::size_t, PoseForm> forms[] = {{3, PoseForm::planar},
+                                                        {6, PoseForm::euler},
+                                                        {7, PoseForm::quaternion},
+                                                        {12, PoseForm::matrix},
+                                                        {16, PoseForm::matrix}};
   const auto time = find_time(table, options);
   const std::vector<std::size_t> taken(time ? 1 : 0, time ? time->index : 0);
   const std::vector<std::size_t> chosen =
       choose_columns(table, options.pose_columns, taken, "pose-columns");
-  std::vector<Quantity> quantities;
-  const auto add = [&](auto&& more) {
-    quantities.insert(quantities.end(), std::begin(more), std::end(more));
+  const auto found =
+      std::ranges::find(forms, chosen.size(), &std::pair<std::size_t, PoseForm>::first);
+  if (found == std::end(forms)) {
+    table.refuse_columns(
+        "`pose-columns {}` names {} columns; give three, X,Y,THETA, or of poses in space six "
+        "(X,Y,Z,ROLL,PITCH,YAW, or a rotation vector), seven (TX,TY,TZ,QX,QY,QZ,QW), or the 12 "
+        "or 16 numbers of a matrix",
+        options.pose_columns, chosen.size());
+  }
+  PoseForm form = found->second;
+  if (form == PoseForm::euler) {
+    // UR's names and rx, ry, rz say what they are; other angles are roll, pitch and yaw.
+    const std::string_view name = table.columns()[chosen[3]];
+    const bool is_vector =
+        options.euler.empty() && (alike(parts_of(name, angle_units).stem, "rx") ||
+                                  alike(name.substr(0, 15), "actual_TCP_pose"));
+    form = is_vector ? PoseForm::rotation_vector : form;
+  }
+  return pose_columns(table, form, chosen, options);
+}
+
+/// True for three axes of x, y and z in lower case (fixed) or in upper case (moving), none of which
+/// follows itself.
+bool are_axes(std::string_view axes) {
+  const auto all_of = [&](std::string_view letters) {
+    return axes.find_first_not_of(letters) == axes.npos;
   };
-  PoseColumns pose{.are_usual = chosen.size() == 3 || chosen.size() == 7};
-  switch (chosen.size()) {
-    case 3:
-      add(planar_position);
-      quantities.push_back(theta);
-      break;
-    case 6: {
-      // UR's names and rx, ry, rz say what they are; other angles are roll, pitch and yaw.
-      const std::string_view first = table.columns()[chosen[3]];
-      const bool is_vector =
-          options.euler == "vector" ||
-          (options.euler.empty() && (alike(parts_of(first, angle_units).stem, "rx") ||
-                                     alike(first.substr(0, 15), "actual_TCP_pose")));
-      pose.form = is_vector ? PoseForm::rotation_vector : PoseForm::euler;
-      add(position);
-      add(roll_pitch_yaw);
-      break;
-    }
-    case 7:
-      pose.form = PoseForm::quaternion;
-      add(position);
-      add(quaternion);
-      break;
-    case 12:
-    case 16:
-      pose.form = PoseForm::matrix;
-      quantities.assign(chosen.size(), position[0]);
-      break;
-    default:
-      table.refuse_columns(
-          "`pose-columns {}` names {} columns; give three, X,Y,THETA, or of poses in space six "
-          "(X,Y,Z,ROLL,PITCH,YAW, or a rotation vector), seven (TX,TY,TZ,QX,QY,QZ,QW), or the 12 "
-          "or 16 numbers of a matrix",
-          options.pose_columns, chosen.size());
-  }
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    pose.columns.push_back(unit_column(table, chosen[i], quantities[i].units, options));
-  }
-  return pose;
+  return axes.size() == 3 && (all_of("xyz") || all_of("XYZ")) && axes[0] != axes[1] &&
+         axes[1] != axes[2];
 }
 
 }  // namespace
@@ -221,15 +207,12 @@ void validate(const TableOptions& options) {
 }
 
 std::optional<Unit> given_unit(const TableOptions& options, std::span<const Unit> units) {
-  const std::string& pose = options.pose_unit;
-  const std::size_t comma = std::min(pose.find(','), pose.size());
-  const std::string name = units.data() == time_units.data()     ? options.time_unit
-                           : units.data() == length_units.data() ? pose.substr(0, comma)
-                           : units.data() == angle_units.data()
-                               ? pose.substr(std::min(comma + 1, pose.size()))
-                               : "";
-  const auto found = std::ranges::find(units, name, &Unit::name);
-  return name.empty() || found == units.end() ? std::nullopt : std::optional(*found);
+  std::vector<std::string_view> names = split_text(options.pose_unit, ',');
+  names.emplace_back(options.time_unit);
+  const auto found = std::ranges::find_if(units, [&](const Unit& unit) {
+    return !unit.name.empty() && std::ranges::find(names, unit.name) != names.end();
+  });
+  return found == units.end() ? std::nullopt : std::optional(*found);
 }
 
 std::vector<std::pair<std::string, std::string>> conditions(const TableOptions& options) {
@@ -299,8 +282,22 @@ std::optional<UnitColumn> find_time(const CsvTable& table, const TableOptions& o
                : find_column(table, names_of_time, time_units, options);
 }
 
+PoseColumns pose_columns(const CsvTable& table, PoseForm form,
+                         const std::vector<std::size_t>& indices, const TableOptions& options) {
+  const std::vector<Quantity> quantities = quantities_of(form);
+  PoseColumns pose{form, {}};
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    pose.columns.push_back(unit_column(table, indices[i], quantities[i].units, options));
+  }
+  return pose;
+}
+
 PoseColumns find_pose(const CsvTable& table, const TableOptions& options) {
-  return options.pose_columns.empty() ? usual_pose(table, options) : named_pose(table, options);
+  PoseColumns pose =
+      options.pose_columns.empty() ? usual_pose(table, options) : named_pose(table, options);
+  const bool is_vector = pose.form == PoseForm::euler && options.euler == "vector";
+  pose.form = is_vector ? PoseForm::rotation_vector : pose.form;
+  return pose;
 }
 
 }  // namespace palpate

@@ -25,6 +25,7 @@ struct Unit {
   double convert(double number) const { return number * multiplier / divisor; }
 };
 
+inline constexpr std::array<Unit, 1> no_unit{{{""}}};
 // Units of the tables; the first of each list is the default.
 inline constexpr std::array<Unit, 4> time_units{
     {{"s"}, {"ms", 1.0, 1e3}, {"us", 1.0, 1e6}, {"ns", 1.0, 1e9}}};
@@ -58,8 +59,8 @@ struct TableOptions {
 /// @throws Error naming the option whose value makes no sense
 void validate(const TableOptions& options);
 
-/// The unit that the options give for times, lengths or angles, whichever `units` (time_units,
-/// length_units or angle_units: compared by address) are; none where they give none.
+/// The one of these units that the options give for times, lengths or angles; none where they give
+/// none.
 std::optional<Unit> given_unit(const TableOptions& options, std::span<const Unit> units);
 
 /// `where` as pairs of a column and the value that its cells must have; call validate() first.
@@ -100,13 +101,40 @@ enum class PoseForm { planar, quaternion, euler, rotation_vector, matrix };
 struct PoseColumns {
   PoseForm form = PoseForm::planar;
   std::vector<UnitColumn> columns;  ///< in the order of the form
-  bool are_usual = true;            ///< x, y, theta, or a quaternion: nothing needs to be said
 };
+
+/// The columns of these indices as a pose of this form. @throws Error as unit_column()
+PoseColumns pose_columns(const CsvTable& table, PoseForm form,
+                         const std::vector<std::size_t>& indices, const TableOptions& options);
 
 /// Finds the columns of poses that the options name, or else that have the usual names of one form;
 /// no columns where there are none.
 /// @throws Error where the options name so many that they are no pose
 PoseColumns find_pose(const CsvTable& table, const TableOptions& options);
+
+/// The columns that a text names, in its order: names, or numbers counted from 1; FIRST:LAST;
+/// START::STEP, every STEP-th from START on; patterns in which `*` is any text and `{n}` a number,
+/// by which the columns are ordered; and beginnings of names. Commas separate them.
+/// @param taken columns that hold something else, which FIRST:LAST may not cross
+/// @param option that gives the text, for messages: "pressure-columns"
+/// @throws Error where a part names no column, or one twice
+std::vector<std::size_t> choose_columns(const CsvTable& table, const std::string& text,
+                                        const std::vector<std::size_t>& taken, const char* option);
+
+/// For each element the columns of the axes of which its reading is made: one, or x, y and z.
+using PressureColumns = std::vector<std::vector<std::size_t>>;
+
+/// The columns of each element among those of the pressures.
+/// @throws Error where they are more or fewer than the elements, or not in their order
+PressureColumns pressure_columns(const CsvTable& table, const std::vector<std::size_t>& columns,
+                                 std::size_t elements, const TableOptions& options);
+
+/// True where the rows are as wide as the array's grid.
+bool is_of_blocks(const CsvTable& table, const TableOptions& options);
+
+/// The reading of the row in the columns of an element, NaN where it is unknown: of the last axis,
+/// or the length of the vector.
+double reading_in(const CsvTable& table, const std::vector<std::size_t>& axes, bool is_norm);
 
 /// A row at which the clock of a table steps back.
 struct ClockStep {
@@ -115,12 +143,6 @@ struct ClockStep {
   double from_s = 0.0;
   double to_s = 0.0;
 };
-
-/// Seconds of a date and time by ISO 8601, such as 2026-11-29T12:41:27.5+01:00, since the Unix
-/// epoch (without an offset as of UTC), or of a time of day, such as 12:41:27,5, since midnight;
-/// none where the text is neither.
-/// @param of_day gets whether it is a time of day
-std::optional<double> clock_time_of(std::string_view text, bool& of_day);
 
 /// Reads the times of a table's rows, in numbers or as clocks write them.
 class TableTimes {

@@ -3,8 +3,8 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
-#include "model/number_text.hpp"
 #include "model/printable.hpp"
 
 namespace palpate {
@@ -17,14 +17,22 @@ constexpr double day_s = 86400.0;
 // Rows that are not sorted step back more often than a clock is set.
 constexpr std::size_t most_steps = 10;
 
-/// Takes so many digits from the front of the text; none where it does not begin with them.
-std::optional<int> take_digits(std::string_view& text, std::size_t count) {
-  const auto number =
-      text.size() >= count && text.substr(0, count).find_first_not_of("0123456789") == text.npos
-          ? whole_number_of(text.substr(0, count))
-          : std::nullopt;
-  text.remove_prefix(number ? count : 0);
-  return number ? std::optional(static_cast<int>(*number)) : std::nullopt;
+/// Takes numbers of this form, 0 for each digit, from the front of the text; none where it begins
+/// otherwise.
+std::optional<std::array<int, 3>> take_numbers(std::string_view& text, std::string_view form) {
+  std::array<int, 3> numbers{};
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < form.size(); ++i) {
+    const char c = i < text.size() ? text[i] : '\0';
+    const bool is_digit = c >= '0' && c <= '9';
+    if (form[i] == '0' ? !is_digit : c != form[i]) {
+      return {};
+    }
+    at += is_digit ? 0 : 1;
+    numbers[at] = is_digit ? 10 * numbers[at] + (c - '0') : 0;
+  }
+  text.remove_prefix(form.size());
+  return numbers;
 }
 
 bool take(std::string_view& text, std::string_view any_of) {
@@ -35,63 +43,43 @@ bool take(std::string_view& text, std::string_view any_of) {
 
 /// Takes HH:MM or HH:MM:SS with a fraction; none where the text does not begin with it.
 std::optional<double> take_clock(std::string_view& text) {
-  const auto hours = take_digits(text, 2);
-  if (!hours || !take(text, ":")) {
-    return {};
-  }
-  const auto minutes = take_digits(text, 2);
-  double seconds = 0.0;
-  if (take(text, ":")) {
-    const auto whole = take_digits(text, 2);
-    if (!whole) {
-      return {};
-    }
-    seconds = *whole;
-    if (take(text, ".,")) {
-      for (double unit = 0.1; !text.empty() && text.front() >= '0' && text.front() <= '9';
-           unit /= 10.0) {
-        seconds += unit * (text.front() - '0');
-        text.remove_prefix(1);
-      }
+  const auto hours_minutes = take_numbers(text, "00:00");
+  const auto whole = take_numbers(text, ":00");
+  double seconds = whole ? (*whole)[1] : 0.0;
+  if (whole && take(text, ".,")) {
+    for (double unit = 0.1; !text.empty() && text.front() >= '0' && text.front() <= '9';
+         unit /= 10.0) {
+      seconds += unit * (text.front() - '0');
+      text.remove_prefix(1);
     }
   }
   constexpr double leap_second = 61.0;
-  if (!minutes || *hours > 24 || *minutes > 59 || seconds >= leap_second) {
-    return {};
-  }
-  return *hours * 3600.0 + *minutes * 60.0 + seconds;
+  const auto [hours, minutes, none] = hours_minutes.value_or(std::array{25, 0, 0});
+  const bool is_time = hours <= 24 && minutes <= 59 && seconds < leap_second;
+  return is_time ? std::optional(hours * 3600.0 + minutes * 60.0 + seconds) : std::nullopt;
 }
 
 /// Takes YYYY-MM-DD, or DD.MM.YYYY; the seconds of its midnight since the Unix epoch.
 std::optional<double> take_date(std::string_view& text) {
-  std::string_view rest = text;
-  std::optional<int> year = take_digits(rest, 4);
-  std::optional<int> month;
-  std::optional<int> day;
-  if (year && take(rest, "-/")) {
-    month = take_digits(rest, 2);
-    day = take(rest, "-/") ? take_digits(rest, 2) : std::nullopt;
-  } else {
-    rest = text;
-    day = take_digits(rest, 2);
-    month = take(rest, ".") ? take_digits(rest, 2) : std::nullopt;
-    year = take(rest, ".") ? take_digits(rest, 4) : std::nullopt;
-  }
-  if (!year || !month || !day) {
-    return {};
+  auto numbers = take_numbers(text, "0000-00-00");
+  numbers = numbers ? numbers : take_numbers(text, "0000/00/00");
+  if (!numbers) {
+    numbers = take_numbers(text, "00.00.0000");
+    if (!numbers) {
+      return {};
+    }
+    std::swap((*numbers)[0], (*numbers)[2]);
   }
   using namespace std::chrono;
-  const year_month_day date{std::chrono::year(*year), std::chrono::month(*month),
-                            std::chrono::day(*day)};
-  if (!date.ok()) {
-    return {};
-  }
-  text = rest;
-  return day_s * sys_days(date).time_since_epoch().count();
+  const year_month_day date{year((*numbers)[0]), month((*numbers)[1]), day((*numbers)[2])};
+  return date.ok() ? std::optional(day_s * sys_days(date).time_since_epoch().count())
+                   : std::nullopt;
 }
 
-}  // namespace
-
+/// Seconds of a date and time by ISO 8601, such as 2026-11-29T12:41:27.5+01:00, since the Unix
+/// epoch (without an offset as of UTC), or of a time of day, such as 12:41:27,5, since midnight;
+/// none where the text is neither.
+/// @param of_day gets whether it is a time of day
 std::optional<double> clock_time_of(std::string_view text, bool& of_day) {
   const auto midnight_s = take_date(text);
   of_day = !midnight_s;
@@ -106,18 +94,20 @@ std::optional<double> clock_time_of(std::string_view text, bool& of_day) {
   if (midnight_s && !take(text, "Zz")) {
     const bool behind = text.starts_with('-');
     if (take(text, "+-")) {
-      const auto hours = take_digits(text, 2);
+      const auto hours = take_numbers(text, "00");
       take(text, ":");
-      const auto minutes = take_digits(text, 2);
+      const auto minutes = take_numbers(text, "00").value_or(std::array{0, 0, 0});
       if (!hours) {
         return {};
       }
-      offset_s = (*hours * 3600.0 + minutes.value_or(0) * 60.0) * (behind ? -1.0 : 1.0);
+      offset_s = ((*hours)[0] * 3600.0 + minutes[0] * 60.0) * (behind ? -1.0 : 1.0);
     }
   }
   return text.empty() ? std::optional(midnight_s.value_or(0.0) + *clock_s - offset_s)
                       : std::nullopt;
 }
+
+}  // namespace
 
 double TableTimes::next(std::size_t row) {
   const std::string_view text = table_.text(column_.index);

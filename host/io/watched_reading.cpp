@@ -4,8 +4,6 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
-#include <hdf5.h>
-
 #include <algorithm>
 #include <cstring>
 #include <fstream>

@@ -14,7 +14,7 @@
 #include "estimation/log_sum.hpp"
 #include "learning/local_search.hpp"
 #include "palpate/error.hpp"
-#include "recognition/object_fit.hpp"
+#include "recognition/label_probability.hpp"
 
 namespace palpate {
 

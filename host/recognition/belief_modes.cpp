@@ -187,13 +187,12 @@ FoundModes find_modes(const BinnedObject& of, std::span<const BinShare> bins) {
   for (const BinShare& bin : bins) {
     at.push_back(indices_of(of.lattice, bin.bin));
   }
-  BeliefCells cells(of, bins, at);
-  cells.climb();
+  const BeliefPeaks of_cells = peaks_of(of, bins, at);
   PlacedBody body(of);
-  std::vector<Moments> peaks(cells.peaks());
+  std::vector<Moments> peaks(of_cells.count);
   for (std::size_t i = 0; i < bins.size(); ++i) {
-    const int peak = cells.peak_of(at[i]);
-    if (peak == BeliefCells::outside) {
+    const int peak = of_cells.of_bin[i];
+    if (peak == BeliefPeaks::outside) {
       continue;
     }
     Moments& sums = peaks[peak];
@@ -209,8 +208,8 @@ FoundModes find_modes(const BinnedObject& of, std::span<const BinShare> bins) {
   FoundModes found;
   found.mode_of.reserve(bins.size());
   for (std::size_t i = 0; i < bins.size(); ++i) {
-    const int peak = cells.peak_of(at[i]);
-    const bool of_none = peak == BeliefCells::outside || mode_of[peak] == peaks.size();
+    const int peak = of_cells.of_bin[i];
+    const bool of_none = peak == BeliefPeaks::outside || mode_of[peak] == peaks.size();
     found.mode_of.push_back(of_none ? moments.size() : mode_of[peak]);
     if (of_none) {
       continue;

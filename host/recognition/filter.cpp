@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "estimation/pose_draws.hpp"
 #include "model/random.hpp"
 
 namespace palpate {
@@ -73,24 +72,12 @@ class HistogramFilter final : public FilterInBins<PoseHistogram> {
   const PoseHistogram* histogram() const override { return &own_; }
 };
 
-/// The tolerance, the budget, and how closely evidence is found.
-std::string goal_words(const BoundedOptions& options) {
-  std::string words = fmt::format("tolerance {:g}", options.tolerance);
-  words += options.budget_s ? fmt::format(", budget {:g} ms", 1e3 * *options.budget_s) : "";
-  if (options.evidence_nats) {
-    words += fmt::format(", evidence within {:g} nats", *options.evidence_nats);
-    words += options.evidence_growth > 0.0
-                 ? fmt::format(", {:g} more with every further touch",
-                               *options.evidence_nats * options.evidence_growth)
-                 : "";
-  }
-  return words;
-}
-
 class BoundedFilter final : public FilterInBins<BoundedPosterior> {
  public:
   BoundedFilter(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
-      : FilterInBins(BoundedPosterior(hypotheses, options)), goal_(goal_words(options)) {}
+      : FilterInBins(BoundedPosterior(hypotheses, options)),
+        goal_(fmt::format("tolerance {:g}", options.tolerance) +
+              (options.budget_s ? fmt::format(", budget {:g} ms", 1e3 * *options.budget_s) : "")) {}
 
   Estimate estimate(std::optional<double> tolerance) const override {
     return own_.estimate(tolerance);

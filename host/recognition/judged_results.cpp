@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <set>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -18,40 +17,45 @@ namespace palpate {
 
 namespace {
 
-using Json = nlohmann::json;
+using Parsed = nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr const char* remedy = "give what palpate recognize (`json`) or palpate batch wrote";
 
-/// A field that no evaluation reads, but that people look at.
-struct ShownField {
-  const char* object;  ///< that holds it; "": the record
-  const char* key;
-  bool (*fits)(const Json& value);
-  const char* words;
-};
-
-bool is_text(const Json& value) { return value.is_string(); }
-bool is_truth(const Json& value) { return value.is_boolean(); }
-bool is_count(const Json& value) {
+bool is_text(const Parsed& value) { return value.is_string(); }
+bool is_truth(const Parsed& value) { return value.is_boolean(); }
+bool is_number(const Parsed& value) { return value.is_number(); }
+bool is_object(const Parsed& value) { return value.is_object(); }
+bool is_count(const Parsed& value) {
   return value.is_number_unsigned() && value.get<std::uint64_t>() <= 1'000'000'000;
 }
 
-constexpr ShownField shown_fields[] = {{"", "recording", is_text, "a name"},
-                                       {"", "error", is_text, "a sentence"},
-                                       {"", "touches", is_count, "a whole number from 0"},
-                                       {"", "unknown", is_count, "a whole number from 0"},
-                                       {"", "touch", is_count, "a whole number from 0"},
-                                       {"mode", "map", is_text, "a file"},
-                                       {"mode", "mirrored", is_truth, "true or false"},
-                                       {"fit", "verdict", is_text, "a word"},
-                                       {"decision", "act", is_truth, "true or false"}};
+/// What a field must be.
+struct FieldKind {
+  bool (*fits)(const Parsed& value);
+  const char* words;
+};
+constexpr FieldKind a_label{is_text, "a label"};
+constexpr FieldKind a_number{is_number, "a number"};
+constexpr FieldKind a_count{is_count, "a whole number from 0"};
+constexpr FieldKind a_truth{is_truth, "true or false"};
+
+/// Fields that no evaluation reads, but that people look at.
+constexpr std::pair<const char*, FieldKind> shown_fields[] = {{"recording", {is_text, "a name"}},
+                                                              {"error", {is_text, "a sentence"}},
+                                                              {"touches", a_count},
+                                                              {"unknown", a_count},
+                                                              {"touch", a_count},
+                                                              {"mode.map", {is_text, "a file"}},
+                                                              {"mode.mirrored", a_truth},
+                                                              {"fit.verdict", {is_text, "a word"}},
+                                                              {"decision.act", a_truth}};
 
 constexpr int most_nested = 64;  // a record is copied and written level by level
 
-bool is_nested_within(const Json& value, int levels) {
+bool is_nested_within(const Parsed& value, int levels) {
   return !value.is_structured() ||
-         (levels > 0 && std::ranges::all_of(value, [levels](const Json& part) {
+         (levels > 0 && std::ranges::all_of(value, [levels](const Parsed& part) {
             return is_nested_within(part, levels - 1);
           }));
 }
@@ -59,7 +63,7 @@ bool is_nested_within(const Json& value, int levels) {
 /// One record, and the words that name it in a message.
 class RecordReader {
  public:
-  RecordReader(const fs::path& file, std::size_t index, const Json& record)
+  RecordReader(const fs::path& file, std::size_t index, const Parsed& record)
       : file_(file), index_(index), record_(record) {
     if (!record.is_object()) {
       refuse(file, "record {} is no JSON object but {}; {}", index, record.type_name(), remedy);
@@ -67,17 +71,20 @@ class RecordReader {
   }
 
   /// Whether the unknown could not be recognised, which palpate batch tells.
-  bool failed() const { return find(record_, "error") != nullptr && !record_.contains("best"); }
+  bool failed() const { return find("error") != nullptr && !record_.contains("best"); }
 
   /// None where the true label is not known. The other fields are checked all the same.
   std::optional<JudgedRecord> read() const {
-    JudgedRecord judged{.truth = true_label(),
-                        .best = text("best", find(record_, "best")),
+    JudgedRecord judged{.truth = find("truth") == nullptr ? "" : text("truth.object"),
+                        .best = text("best"),
                         .identity = identity(),
-                        .none = probability("none"),
-                        .fit_z = fit_z(),
+                        .none = {},
+                        .fit_z = number("fit.z"),
                         .error_mm = error("error_mm"),
                         .refined_error_mm = error("refined_error_mm")};
+    if (const Parsed* none = find("none")) {
+      judged.none = probability("none", *none);
+    }
     if (!judged.identity.contains(judged.best)) {
       refuse_field("best", "'{}' has no probability in 'identity'; {}", judged.best, remedy);
     }
@@ -88,16 +95,9 @@ class RecordReader {
     if (!is_nested_within(record_, most_nested)) {
       refuse(file_, "record {} is nested more than {} deep; {}", index_, most_nested, remedy);
     }
-    for (const auto& [object, key, fits, words] : shown_fields) {
-      const bool inside = *object != '\0';
-      const Json* of = inside ? find(record_, object) : &record_;
-      if (of != nullptr && !of->is_object()) {
-        refuse_field(object, "is {}, not an object; {}", of->type_name(), remedy);
-      }
-      const Json* value = of == nullptr ? nullptr : find(*of, key);
-      if (value != nullptr && !fits(*value)) {
-        refuse_field(inside ? fmt::format("{}.{}", object, key) : key, "is {}, not {}; {}",
-                     value->is_number() ? value->dump() : value->type_name(), words, remedy);
+    for (const auto& [field, kind] : shown_fields) {
+      if (const Parsed* value = find(field)) {
+        require(field, value, kind);
       }
     }
   }
@@ -110,62 +110,58 @@ class RecordReader {
     refuse(file_, "record {}: field '{}' {}", index_, field, fmt::format(message, parts...));
   }
 
-  /// The field; null where it is missing or null, as numbers that are not finite are in JSON.
-  const Json* find(const Json& object, const char* key) const {
-    const auto found = object.find(key);
-    return found == object.end() || found->is_null() ? nullptr : &*found;
-  }
-
-  std::string text(const char* field, const Json* found) const {
-    if (found == nullptr || !found->is_string()) {
-      refuse_field(field, "is {}, not a label; {}",
-                   found == nullptr ? "missing" : found->type_name(), remedy);
+  const Parsed& require(const std::string& field, const Parsed* value,
+                        const FieldKind& kind) const {
+    if (value == nullptr || !kind.fits(*value)) {
+      refuse_field(field, "is {}, not {}; {}",
+                   value == nullptr     ? "missing"
+                   : value->is_number() ? value->dump()
+                                        : value->type_name(),
+                   kind.words, remedy);
     }
-    return found->get<std::string>();
+    return *value;
   }
 
-  double number(const std::string& field, const Json& value) const {
-    if (!value.is_number()) {
-      refuse_field(field, "is {}, not a number; {}", value.type_name(), remedy);
-    }
-    return value.get<double>();
+  /// The field, or that of an object in the record, as "fit.z"; null where it is missing or null,
+  /// as numbers that are not finite are in JSON.
+  const Parsed* find(const std::string& field) const {
+    const auto member = [](const Parsed& object, const std::string& key) {
+      const auto found = object.find(key);
+      return found == object.end() || found->is_null() ? nullptr : &*found;
+    };
+    const std::size_t dot = field.find('.');
+    const std::string outer = field.substr(0, dot);
+    const Parsed* found = member(record_, outer);
+    return found == nullptr || dot == field.npos
+               ? found
+               : member(require(outer, found, {is_object, "an object"}), field.substr(dot + 1));
   }
 
-  double probability(const std::string& field, const Json& value) const {
+  std::string text(const char* field) const {
+    return require(field, find(field), a_label).get<std::string>();
+  }
+
+  std::optional<double> number(const char* field) const {
+    const Parsed* found = find(field);
+    return found == nullptr ? std::nullopt
+                            : std::optional(require(field, found, a_number).get<double>());
+  }
+
+  double probability(const std::string& field, const Parsed& value) const {
     constexpr double rounding = 1e-9;  // of a sum over the maps of a label
-    const double p = number(field, value);
+    const auto p = require(field, &value, a_number).get<double>();
     if (!(p >= 0.0 && p <= 1.0 + rounding)) {
       refuse_field(field, "= {}, not a probability; give 0 to 1", p);
     }
     return std::min(p, 1.0);
   }
 
-  std::optional<double> probability(const char* key) const {
-    const Json* found = find(record_, key);
-    return found == nullptr ? std::nullopt : std::optional(probability(key, *found));
-  }
-
-  std::string true_label() const {
-    const Json* truth = find(record_, "truth");
-    if (truth == nullptr) {
-      return "";
-    }
-    if (!truth->is_object()) {
-      refuse_field("truth", "is {}, not an object with the true label 'object'; {}",
-                   truth->type_name(), remedy);
-    }
-    return text("truth.object", find(*truth, "object"));
-  }
-
   std::map<std::string, double> identity() const {
-    const Json* found = find(record_, "identity");
-    if (found == nullptr || !found->is_object()) {
-      refuse_field("identity", "is {}, not {{label: probability}}; {}",
-                   found == nullptr ? "missing" : found->type_name(), remedy);
-    }
     std::map<std::string, double> result;
     double sum = 0.0;
-    for (const auto& [label, value] : found->items()) {
+    const Parsed& found =
+        require("identity", find("identity"), {is_object, "{label: probability}"});
+    for (const auto& [label, value] : found.items()) {
       sum += result[label] = probability("identity." + label, value);
     }
     constexpr double tolerance = 0.01;  // of numbers that another program has rounded
@@ -175,45 +171,29 @@ class RecordReader {
     return result;
   }
 
-  std::optional<double> fit_z() const {
-    const Json* fit = find(record_, "fit");
-    if (fit == nullptr) {
-      return {};
-    }
-    if (!fit->is_object()) {
-      refuse_field("fit", "is {}, not an object with 'z'; {}", fit->type_name(), remedy);
-    }
-    const Json* z = find(*fit, "z");
-    return z == nullptr ? std::nullopt : std::optional(number("fit.z", *z));
-  }
-
-  std::optional<double> error(const char* key) const {
-    const Json* found = find(record_, key);
-    if (found == nullptr) {
-      return {};
-    }
-    const double error_mm = number(key, *found);
-    if (error_mm < 0.0) {
-      refuse_field(key, "= {} mm; give at least 0", error_mm);
+  std::optional<double> error(const char* field) const {
+    const std::optional<double> error_mm = number(field);
+    if (error_mm.value_or(0.0) < 0.0) {
+      refuse_field(field, "= {} mm; give at least 0", *error_mm);
     }
     return error_mm;
   }
 
   const fs::path& file_;
   std::size_t index_;
-  const Json& record_;
+  const Parsed& record_;
 };
 
 /// One JSON value a line; blank lines are passed over.
-Json parse_lines(const fs::path& file, std::string_view bytes) {
-  Json records = Json::array();
+Parsed parse_lines(const fs::path& file, std::string_view bytes) {
+  Parsed records = Parsed::array();
   for (std::size_t line = 1; !bytes.empty(); ++line) {
     const std::string_view text = bytes.substr(0, bytes.find('\n'));
     bytes.remove_prefix(std::min(text.size() + 1, bytes.size()));
     if (text.find_first_not_of(" \t\r") == text.npos) {
       continue;
     }
-    records.push_back(Json::parse(text, nullptr, false));
+    records.push_back(Parsed::parse(text, nullptr, false));
     if (records.back().is_discarded()) {
       refuse(file, "line {} (record {}) is not JSON; {}", line, records.size() - 1, remedy);
     }
@@ -221,36 +201,26 @@ Json parse_lines(const fs::path& file, std::string_view bytes) {
   return records;
 }
 
-Json parse(const fs::path& file, const std::string& bytes) {
+Parsed parse(const fs::path& file, const std::string& bytes) {
   const bool lines = bytes.find_first_of('{') == bytes.find_first_not_of(" \t\r\n");
-  Json json;
+  Parsed json;
   try {
-    json = Json::parse(bytes);
-  } catch (const Json::parse_error& error) {
+    json = Parsed::parse(bytes);
+  } catch (const Parsed::parse_error& error) {
     if (lines) {  // a record ends with its line
       return parse_lines(file, bytes);
     }
     refuse(file, "is not JSON at byte {}; {}", error.byte, remedy);
-  } catch (const Json::out_of_range&) {
+  } catch (const Parsed::out_of_range&) {
     refuse(file, "holds a number that is too large for JSON; {}", remedy);
   }
   if (json.is_object()) {
-    return Json::array({std::move(json)});
+    return Parsed::array({std::move(json)});
   }
   if (!json.is_array()) {
     refuse(file, "holds {}, not an array of records; {}", json.type_name(), remedy);
   }
   return json;
-}
-
-std::string read_bytes(const fs::path& file) {
-  require_readable(file);
-  std::ifstream stream(file, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream) {
-    refuse(file, "cannot be read; copy it again");
-  }
-  return bytes;
 }
 
 /// The chunks of a folder of palpate batch, which has a task, or the *.json of another one, by
@@ -260,20 +230,13 @@ std::vector<fs::path> files_of(const fs::path& results) {
   const bool batch = fs::is_regular_file(results / "task.ndjson", error);
   const fs::path folder = batch ? results / "chunks" : results;
   const char* const extension = batch ? ".ndjson" : ".json";
-  const fs::directory_iterator entries(folder, error);
-  if (error) {
-    refuse(folder, "cannot be read: {}; check its permissions", error.message());
-  }
-  std::vector<fs::path> files;
-  for (const auto& entry : entries) {
-    if (entry.path().extension() == extension && !entry.is_directory(error)) {
-      files.push_back(entry.path());
-    }
-  }
+  std::vector<fs::path> files = paths_in(folder);
+  std::erase_if(files, [&](const fs::path& file) {
+    return file.extension() != extension || fs::is_directory(file, error);
+  });
   if (files.empty()) {
     refuse(folder, "a folder without *{}; {}", extension, remedy);
   }
-  std::sort(files.begin(), files.end());
   return files;
 }
 
@@ -298,7 +261,7 @@ std::vector<fs::path> result_files(std::span<const std::string> arguments) {
 }
 
 void add_records(const fs::path& file, const std::string& text, JudgedResults& results) {
-  const Json records = parse(file, text);
+  const Parsed records = parse(file, text);
   for (std::size_t i = 0; i < records.size(); ++i) {
     const RecordReader reader(file, i, records[i]);
     if (reader.failed()) {
@@ -311,8 +274,8 @@ void add_records(const fs::path& file, const std::string& text, JudgedResults& r
   }
 }
 
-std::vector<Json> records_in(const fs::path& file) {
-  const Json records = parse(file, read_bytes(file));
+std::vector<Parsed> records_in(const fs::path& file) {
+  const Parsed records = parse(file, read_bytes(file));
   for (std::size_t i = 0; i < records.size(); ++i) {
     const RecordReader reader(file, i, records[i]);
     reader.require_shown_fields();
@@ -339,14 +302,6 @@ Evaluation evaluate(const JudgedResults& results, const fs::path& source) {
            results.without_truth);
   }
   return evaluate(results.records);
-}
-
-std::string failed_words(const JudgedResults& results) {
-  return results.failed == 0
-             ? ""
-             : fmt::format(
-                   "{} unknown{} could not be recognised, and left out; their records say why",
-                   results.failed, results.failed == 1 ? "" : "s");
 }
 
 }  // namespace palpate

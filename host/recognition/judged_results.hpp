@@ -46,7 +46,4 @@ void add_records(const std::filesystem::path& file, const std::string& text,
 /// @throws Error (Fault::input) where no record has a true label
 Evaluation evaluate(const JudgedResults& results, const std::filesystem::path& source);
 
-/// How many unknowns were left out because they could not be recognised; "" where none was.
-std::string failed_words(const JudgedResults& results);
-
 }  // namespace palpate

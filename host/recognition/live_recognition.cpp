@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
-#include "palpate/baseline.hpp"
 #include "palpate/pose_track.hpp"
+#include "palpate/sensor.hpp"
 
 namespace palpate {
 
@@ -17,23 +17,6 @@ using namespace std::chrono_literals;
 
 // A simulation at full speed would fill the memory, and finish() would have to use all of them.
 constexpr std::size_t most_jobs = 64;
-
-/// Signals are for the thread that can end the others: a thread that is started meanwhile leaves
-/// them all to it.
-class SignalsElsewhere {
- public:
-  SignalsElsewhere() {
-    sigset_t all;
-    ::sigfillset(&all);
-    ::pthread_sigmask(SIG_SETMASK, &all, &before_);
-  }
-  ~SignalsElsewhere() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  SignalsElsewhere(const SignalsElsewhere&) = delete;
-  SignalsElsewhere& operator=(const SignalsElsewhere&) = delete;
-
- private:
-  sigset_t before_;
-};
 
 }  // namespace
 
@@ -48,7 +31,6 @@ LiveRecognition::LiveRecognition(Sensor& sensor, std::vector<glm::dvec2> element
       task_(task),
       options_(options),
       on_touch_(std::move(on_touch)) {
-  const SignalsElsewhere block;
   reader_ = std::thread([this] { guard(&LiveRecognition::read); });
   believer_ = std::thread([this] { guard(&LiveRecognition::believe); });
 }
@@ -66,6 +48,9 @@ LiveRecognition::~LiveRecognition() {
 }
 
 void LiveRecognition::guard(void (LiveRecognition::*work)()) {
+  sigset_t all;  // signals are for the thread that can end this one
+  ::sigfillset(&all);
+  ::pthread_sigmask(SIG_SETMASK, &all, nullptr);
   try {
     (this->*work)();
   } catch (...) {
@@ -99,21 +84,46 @@ bool LiveRecognition::failed() const {
 }
 
 void LiveRecognition::reset() {
-  between_touches([this] { begin_unknown(); });
+  between_touches([this] {
+    recogniser_.reset();
+    used_.clear();
+    {
+      const std::lock_guard lock(mutex_);
+      if (state_.touches == 0) {  // one that was never touched is the same still
+        return;
+      }
+      ++state_.unknown;
+      state_.touches = 0;
+      state_.last.reset();
+    }
+    if (options_.on_unknown) {
+      options_.on_unknown();
+    }
+  });
 }
 
 void LiveRecognition::leave_out(std::size_t touch, bool out) {
-  between_touches([this, touch, out] { leave_out_now(touch, out); });
+  between_touches([this, touch, out] {
+    const auto others = std::ranges::count(used_, false, &UsedTouch::left_out);
+    if (touch >= used_.size() || used_[touch].left_out == out || (out && others == 1)) {
+      return;
+    }
+    used_[touch].left_out = out;
+    std::vector<Touch> touches;
+    for (const UsedTouch& used : used_) {
+      if (!used.left_out) {
+        touches.push_back(view_of(used.touch));
+      }
+    }
+    recogniser_.reset();
+    tell(step_after(touches));
+  });
 }
 
 void LiveRecognition::between_touches(std::function<void()> work) {
-  push({.work = std::move(work)});
-}
-
-void LiveRecognition::push(Job job) {
   {
     const std::lock_guard lock(mutex_);
-    jobs_.push_back(std::move(job));
+    jobs_.push_back(std::move(work));
   }
   changed_.notify_all();
 }
@@ -251,7 +261,8 @@ void LiveRecognition::hand_on(const std::optional<DetectedTouch>& touch) {
     ++state_.without_pose;
     return;
   }
-  push({.touch = touch, .taken = taken_, .frames_lost = counters().lost});
+  between_touches(
+      [this, used = UsedTouch{*touch, counters().lost}, taken = taken_] { use(used, taken); });
 }
 
 void LiveRecognition::believe() {
@@ -267,11 +278,11 @@ void LiveRecognition::believe() {
       }
       continue;
     }
-    const Job job = std::move(jobs_.front());
+    const std::function<void()> job = std::move(jobs_.front());
     jobs_.pop_front();
     lock.unlock();
     changed_.notify_all();
-    use(job);
+    job();
     lock.lock();
   }
 }
@@ -283,34 +294,17 @@ Touch LiveRecognition::view_of(const DetectedTouch& touch) const {
           .valid = touch.valid};
 }
 
-void LiveRecognition::begin_unknown() {
-  recogniser_.reset();
-  used_.clear();
-  {
-    const std::lock_guard lock(mutex_);
-    if (state_.touches == 0) {  // one that was never touched is the same still
-      return;
-    }
-    ++state_.unknown;
-    state_.touches = 0;
-    state_.last.reset();
-  }
-  if (options_.on_unknown) {
-    options_.on_unknown();
-  }
+RecognitionStep LiveRecognition::step_after(std::span<const Touch> touches) {
+  return take_step(recogniser_, task_, touches,
+                   partial_truth(description_.object, description_.truth));
 }
 
-void LiveRecognition::use(const Job& job) {
-  if (job.work) {
-    job.work();
-    return;
-  }
-  const Touch touch = view_of(*job.touch);
-  const PartialTruth truth = partial_truth(description_.object, description_.truth);
-  RecognitionStep step = take_step(recogniser_, task_, std::span(&touch, 1), truth);
-  used_.push_back({job, recogniser_.evidence().back().readings});
-  const double latency_ms =
-      std::chrono::duration<double, std::milli>(Clock::now() - job.taken).count();
+void LiveRecognition::use(UsedTouch touch, Clock::time_point taken) {
+  const Touch view = view_of(touch.touch);
+  RecognitionStep step = step_after(std::span(&view, 1));
+  touch.readings = recogniser_.evidence().back().readings;
+  used_.push_back(std::move(touch));
+  const double latency_ms = std::chrono::duration<double, std::milli>(Clock::now() - taken).count();
   {
     const std::lock_guard lock(mutex_);
     ++state_.touches;
@@ -321,29 +315,12 @@ void LiveRecognition::use(const Job& job) {
   tell(std::move(step));
 }
 
-void LiveRecognition::leave_out_now(std::size_t touch, bool out) {
-  const auto others = std::ranges::count(used_, false, &UsedTouch::left_out);
-  if (touch >= used_.size() || used_[touch].left_out == out || (out && others == 1)) {
-    return;
-  }
-  used_[touch].left_out = out;
-  std::vector<Touch> touches;
-  for (const UsedTouch& used : used_) {
-    if (!used.left_out) {
-      touches.push_back(view_of(*used.job.touch));
-    }
-  }
-  recogniser_.reset();
-  tell(take_step(recogniser_, task_, touches,
-                 partial_truth(description_.object, description_.truth)));
-}
-
 void LiveRecognition::tell(RecognitionStep step) {
   const UsedTouch& last = used_.back();
-  LiveTouch result{.touch = *last.job.touch,
+  LiveTouch result{.touch = last.touch,
                    .readings = last.readings,
                    .step = std::move(step),
-                   .frames_lost = last.job.frames_lost};
+                   .frames_lost = last.frames_lost};
   for (std::size_t i = 0; i < used_.size(); ++i) {
     if (used_[i].left_out) {
       result.left_out.push_back(i);

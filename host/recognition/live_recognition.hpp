@@ -106,17 +106,11 @@ class LiveRecognition {
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// A touch for the belief, or other work between touches.
-  struct Job {
-    std::optional<DetectedTouch> touch = {};
-    Clock::time_point taken = {};
-    std::uint64_t frames_lost = 0;
-    std::function<void()> work = {};
-  };
   /// A touch of the unknown, which people may take for a bad one.
   struct UsedTouch {
-    Job job;
-    std::vector<Reading> readings;
+    DetectedTouch touch;
+    std::uint64_t frames_lost = 0;
+    std::vector<Reading> readings = {};
     bool left_out = false;
   };
 
@@ -129,15 +123,14 @@ class LiveRecognition {
   void hand_on(const std::optional<DetectedTouch>& touch);
   bool wait_for_room();
   void believe();
-  void use(const Job& job);
-  void begin_unknown();
-  void leave_out_now(std::size_t touch, bool out);
+  void use(UsedTouch touch, Clock::time_point taken);
+  /// Takes more touches of the unknown into the belief.
+  RecognitionStep step_after(std::span<const Touch> touches);
   /// Takes the result after the last touch to whoever waits for it, and plans the next.
   void tell(RecognitionStep step);
   /// The best next touch of a grid about the belief, with the array of this touch.
   PlannedTouch plan(const DetectedTouch& touch) const;
   Touch view_of(const DetectedTouch& touch) const;
-  void push(Job job);
   /// Runs a thread's work and keeps what it throws.
   void guard(void (LiveRecognition::*work)());
 
@@ -151,7 +144,7 @@ class LiveRecognition {
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<Job> jobs_;
+  std::deque<std::function<void()>> jobs_;  ///< touches for the belief, and work between them
   LiveState state_;
   std::vector<double> latencies_ms_;
   bool stop_ = false;      ///< read no more

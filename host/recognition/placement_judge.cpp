@@ -84,11 +84,77 @@ class Explainer {
     return log_evidence(peak.nats, placed_.log_volume(peak, at, all_));
   }
   /// The touches each lie somewhere else.
-  Explanation displaced(const Pose& from) const;
+  Explanation displaced(const Pose& from) const {
+    constexpr std::size_t points = 64;
+    constexpr double least_mm = 0.2;
+    constexpr double most_mm = 2.0;
+    const DisplacementSd touch_sd = question_.task.touch_sd();
+    const double rad_per_mm =
+        touch_sd.mm > 0.0 && touch_sd.rad > 0.0 ? touch_sd.rad / touch_sd.mm : usual_rad_per_mm;
+    // Each round learns the standard deviation anew (expectation maximisation).
+    double sd_mm = std::max(1.0, touch_sd.mm);
+    PlacedPeak peak{from, 0.0};
+    for (const double first_mm : {1.0, 0.5}) {
+      const auto at = displacement_points({sd_mm, rad_per_mm * sd_mm}, points / 2);
+      peak = placed_.climb(peak.T_object_robot, at, all_, first_mm);
+      const double next_mm = placed_.displaced_mm(peak.T_object_robot, at, all_);
+      // Twice its step, which is short.
+      sd_mm = std::clamp(next_mm * next_mm / sd_mm, least_mm, most_mm);
+    }
+    const DisplacementSd sd{sd_mm, rad_per_mm * sd_mm};
+    const auto at = displacement_points(sd, points);
+    peak = placed_.climb(peak.T_object_robot, at, all_, 0.25);
+    return {.placement = {.object = object_, .displaced = sd},
+            .log_evidence = log_evidence(peak.nats, placed_.log_volume(peak, at, all_)),
+            .fit = fit(touches_, peak.T_object_robot, sd)};
+  }
   /// The object moved once.
   /// @param starts where its parts are climbed from
   /// @param log_places of the volume of the places that it may have moved to, mm^2 rad
-  std::optional<Explanation> moved(const Parts& starts, double log_places) const;
+  std::optional<Explanation> moved(const Parts& starts, double log_places) const {
+    if (question_.in_contact < 2 * fewest_in_contact) {
+      return {};
+    }
+    const std::size_t n = touches_.size();
+    const RecognitionTask& task = question_.task;
+    const auto at = displacement_points(task.touch_sd(), touch_sd_points);
+    double largest = log_zero;
+    std::size_t after = 0;
+    std::array<PlacedPeak, 2> parts;
+    std::size_t in_contact = 0;
+    for (std::size_t k = 1; k < n; ++k) {
+      in_contact += touches_[k - 1].in_contact() ? 1 : 0;
+      if (in_contact < fewest_in_contact || question_.in_contact - in_contact < fewest_in_contact) {
+        continue;
+      }
+      const PlacedPeak a = placed_.climb(starts.before[k].T_object_robot, at, {0, k}, 1.0);
+      const PlacedPeak b = placed_.climb(starts.from[k].T_object_robot, at, {k, n}, 1.0);
+      if (a.nats + b.nats > largest) {
+        largest = a.nats + b.nats;
+        after = k;
+        parts = {a, b};
+      }
+    }
+    if (after == 0) {
+      return {};
+    }
+    const auto& [before, from] = parts;
+    std::vector<TouchEvidence> kept(touches_.begin(), touches_.end());
+    const Pose move = inverse(before.T_object_robot) * from.T_object_robot;
+    for (std::size_t i = after; i < n; ++i) {
+      kept[i].T_robot_sensor = move * kept[i].T_robot_sensor;
+    }
+    const double volumes =
+        placed_.log_volume(before, at, {0, after}) + placed_.log_volume(from, at, {after, n});
+    const std::optional<Body>& body = task.bodies[object_];
+    const double moved_mm = body ? pose_error_mm(*body, task.hypotheses[object_].map.symmetry,
+                                                 before.T_object_robot, from.T_object_robot)
+                                 : 0.0;
+    return Explanation{.placement = {.object = object_, .moved_after = after, .moved_mm = moved_mm},
+                       .log_evidence = log_evidence(largest, volumes - log_places) -
+                                       std::log(static_cast<double>(n - 1)),
+                       .fit = fit(kept, before.T_object_robot, task.touch_sd())};
+  }
   /// The same with all parts climbed from one pose.
   std::optional<Explanation> moved(const Pose& from) const {
     const std::vector<PlacedPeak> here(touches_.size() + 1, {from, 0.0});
@@ -97,10 +163,60 @@ class Explainer {
   /// Looks at places in the whole region, coarsely; none where there are too many. Touches are
   /// added one by one from either end as long as a place is not far worse than the best for as
   /// many.
-  std::optional<Parts> coarse_parts() const;
+  std::optional<Parts> coarse_parts() const {
+    const std::vector<Pose> at(1);
+    constexpr std::array steps{1.25, 1.25, 0.125};  // mm, mm, rad
+    constexpr std::int64_t most_places = 400'000;
+    constexpr double hopeless = 30.0;  // nats; more than the coarse steps cost
+    PoseLattice places = question_.recogniser.lattice();
+    for (const auto& [axis, step] : {std::pair{&places.x_mm, steps[0]},
+                                     {&places.y_mm, steps[1]},
+                                     {&places.theta_rad, steps[2]}}) {
+      axis->count = std::max(static_cast<int>(std::ceil((axis->upper - axis->lower) / step)), 1);
+    }
+    if (places.bins() > most_places) {
+      return {};
+    }
+    const std::size_t n = touches_.size();
+    const PlacedPeak none{{}, log_zero};
+    Parts best{std::vector<PlacedPeak>(n + 1, none), std::vector<PlacedPeak>(n + 1, none)};
+    for (std::int64_t place = 0; place < places.bins(); ++place) {
+      const Pose to = places.T_object_robot(place);
+      const auto add_up = [&](std::vector<PlacedPeak>& parts, bool backwards) {
+        double nats = 0.0;
+        for (std::size_t i = 0; i < n; ++i) {
+          const std::size_t touch = backwards ? n - 1 - i : i;
+          nats += placed_.log_likelihood(to, at, {touch, touch + 1});
+          PlacedPeak& part = parts[backwards ? touch : touch + 1];
+          if (nats > part.nats) {
+            part = {to, nats};
+          } else if (nats < part.nats - hopeless) {
+            break;
+          }
+        }
+      };
+      add_up(best.before, false);
+      add_up(best.from, true);
+    }
+    return best;
+  }
   /// Of the places that suit the first touches or the last, the one that suits all where each may
   /// lie a millimetre beside its place.
-  Pose best_start(const Parts& parts) const;
+  Pose best_start(const Parts& parts) const {
+    const auto at = displacement_points({1.0, usual_rad_per_mm}, 32);
+    PlacedPeak best{{}, log_zero};
+    for (const std::vector<PlacedPeak>* of : {&parts.before, &parts.from}) {
+      for (const PlacedPeak& part : *of) {
+        const double nats = part.nats == log_zero
+                                ? log_zero
+                                : placed_.log_likelihood(part.T_object_robot, at, all_);
+        if (nats > best.nats) {
+          best = {part.T_object_robot, nats};
+        }
+      }
+    }
+    return best.T_object_robot;
+  }
 
  private:
   /// The log evidence of a peak, on the scale of Estimate::log_evidence.
@@ -123,129 +239,6 @@ class Explainer {
   PlacedTouches placed_;
   TouchRange all_{0, touches_.size()};
 };
-
-Explanation Explainer::displaced(const Pose& from) const {
-  constexpr std::size_t points = 64;
-  constexpr double least_mm = 0.2;
-  constexpr double most_mm = 2.0;
-  const DisplacementSd touch_sd = question_.task.touch_sd();
-  const double rad_per_mm =
-      touch_sd.mm > 0.0 && touch_sd.rad > 0.0 ? touch_sd.rad / touch_sd.mm : usual_rad_per_mm;
-  // Each round learns the standard deviation anew (expectation maximisation).
-  double sd_mm = std::max(1.0, touch_sd.mm);
-  PlacedPeak peak{from, 0.0};
-  for (const double first_mm : {1.0, 0.5}) {
-    const auto at = displacement_points({sd_mm, rad_per_mm * sd_mm}, points / 2);
-    peak = placed_.climb(peak.T_object_robot, at, all_, first_mm);
-    const double next_mm = placed_.displaced_mm(peak.T_object_robot, at, all_);
-    // Twice its step, which is short.
-    sd_mm = std::clamp(next_mm * next_mm / sd_mm, least_mm, most_mm);
-  }
-  const DisplacementSd sd{sd_mm, rad_per_mm * sd_mm};
-  const auto at = displacement_points(sd, points);
-  peak = placed_.climb(peak.T_object_robot, at, all_, 0.25);
-  return {.placement = {.object = object_, .displaced = sd},
-          .log_evidence = log_evidence(peak.nats, placed_.log_volume(peak, at, all_)),
-          .fit = fit(touches_, peak.T_object_robot, sd)};
-}
-
-std::optional<Explanation> Explainer::moved(const Parts& starts, double log_places) const {
-  if (question_.in_contact < 2 * fewest_in_contact) {
-    return {};
-  }
-  const std::size_t n = touches_.size();
-  const RecognitionTask& task = question_.task;
-  const auto at = displacement_points(task.touch_sd(), touch_sd_points);
-  double largest = log_zero;
-  std::size_t after = 0;
-  std::array<PlacedPeak, 2> parts;
-  std::size_t in_contact = 0;
-  for (std::size_t k = 1; k < n; ++k) {
-    in_contact += touches_[k - 1].in_contact() ? 1 : 0;
-    if (in_contact < fewest_in_contact || question_.in_contact - in_contact < fewest_in_contact) {
-      continue;
-    }
-    const PlacedPeak a = placed_.climb(starts.before[k].T_object_robot, at, {0, k}, 1.0);
-    const PlacedPeak b = placed_.climb(starts.from[k].T_object_robot, at, {k, n}, 1.0);
-    if (a.nats + b.nats > largest) {
-      largest = a.nats + b.nats;
-      after = k;
-      parts = {a, b};
-    }
-  }
-  if (after == 0) {
-    return {};
-  }
-  const auto& [before, from] = parts;
-  std::vector<TouchEvidence> kept(touches_.begin(), touches_.end());
-  const Pose move = inverse(before.T_object_robot) * from.T_object_robot;
-  for (std::size_t i = after; i < n; ++i) {
-    kept[i].T_robot_sensor = move * kept[i].T_robot_sensor;
-  }
-  const double volumes =
-      placed_.log_volume(before, at, {0, after}) + placed_.log_volume(from, at, {after, n});
-  const std::optional<Body>& body = task.bodies[object_];
-  const double moved_mm = body ? pose_error_mm(*body, task.hypotheses[object_].map.symmetry,
-                                               before.T_object_robot, from.T_object_robot)
-                               : 0.0;
-  return Explanation{.placement = {.object = object_, .moved_after = after, .moved_mm = moved_mm},
-                     .log_evidence = log_evidence(largest, volumes - log_places) -
-                                     std::log(static_cast<double>(n - 1)),
-                     .fit = fit(kept, before.T_object_robot, task.touch_sd())};
-}
-
-std::optional<Parts> Explainer::coarse_parts() const {
-  const std::vector<Pose> at(1);
-  constexpr std::array steps{1.25, 1.25, 0.125};  // mm, mm, rad
-  constexpr std::int64_t most_places = 400'000;
-  constexpr double hopeless = 30.0;  // nats; more than the coarse steps cost
-  PoseLattice places = question_.recogniser.lattice();
-  for (const auto& [axis, step] : {std::pair{&places.x_mm, steps[0]},
-                                   {&places.y_mm, steps[1]},
-                                   {&places.theta_rad, steps[2]}}) {
-    axis->count = std::max(static_cast<int>(std::ceil((axis->upper - axis->lower) / step)), 1);
-  }
-  if (places.bins() > most_places) {
-    return {};
-  }
-  const std::size_t n = touches_.size();
-  const PlacedPeak none{{}, log_zero};
-  Parts best{std::vector<PlacedPeak>(n + 1, none), std::vector<PlacedPeak>(n + 1, none)};
-  for (std::int64_t place = 0; place < places.bins(); ++place) {
-    const Pose to = places.T_object_robot(place);
-    const auto add_up = [&](std::vector<PlacedPeak>& parts, bool backwards) {
-      double nats = 0.0;
-      for (std::size_t i = 0; i < n; ++i) {
-        const std::size_t touch = backwards ? n - 1 - i : i;
-        nats += placed_.log_likelihood(to, at, {touch, touch + 1});
-        PlacedPeak& part = parts[backwards ? touch : touch + 1];
-        if (nats > part.nats) {
-          part = {to, nats};
-        } else if (nats < part.nats - hopeless) {
-          break;
-        }
-      }
-    };
-    add_up(best.before, false);
-    add_up(best.from, true);
-  }
-  return best;
-}
-
-Pose Explainer::best_start(const Parts& parts) const {
-  const auto at = displacement_points({1.0, usual_rad_per_mm}, 32);
-  PlacedPeak best{{}, log_zero};
-  for (const std::vector<PlacedPeak>* of : {&parts.before, &parts.from}) {
-    for (const PlacedPeak& part : *of) {
-      const double nats =
-          part.nats == log_zero ? log_zero : placed_.log_likelihood(part.T_object_robot, at, all_);
-      if (nats > best.nats) {
-        best = {part.T_object_robot, nats};
-      }
-    }
-  }
-  return best.T_object_robot;
-}
 
 /// The most probable hypotheses and where each explains the touches best.
 std::vector<std::pair<int, Pose>> candidates(const Recogniser& recogniser, const Estimate& estimate,
@@ -344,28 +337,19 @@ std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,
   return found ? std::optional(found->placement) : std::nullopt;
 }
 
-std::string placement_words(const TouchPlacement& placement, const RecognitionTask& task) {
+PlacementWords words_of(const TouchPlacement& placement, const RecognitionTask& task) {
   const std::string name = task.name_of(placement.object);
-  return placement.moved_after > 0
-             ? fmt::format(
-                   "the object, {} by the touches, seems to have moved by {:.1f} mm after "
-                   "touch {}",
-                   name, placement.moved_mm, placement.moved_after)
-             : fmt::format(
-                   "the touches fit {} where each lies some {:.1f} mm beside the place that "
-                   "the robot says",
-                   name, placement.displaced.mm);
-}
-
-std::string placement_warning(const TouchPlacement& placement, const RecognitionTask& task) {
-  const std::string words = placement_words(placement, task);
-  return placement.moved_after > 0
-             ? words + ": hold it still, or recognise the touches before and after by themselves"
-             : words + fmt::format(
-                           ": is touch-sd too small? give `touch-sd-mm {:.1f}` "
-                           "`touch-sd-deg {:.1f}`",
-                           placement.displaced.mm,
-                           180.0 / std::numbers::pi * placement.displaced.rad);
+  if (placement.moved_after > 0) {
+    return {fmt::format("the object, {} by the touches, seems to have moved by {:.1f} mm after "
+                        "touch {}",
+                        name, placement.moved_mm, placement.moved_after),
+            "hold it still, or recognise the touches before and after by themselves"};
+  }
+  return {fmt::format("the touches fit {} where each lies some {:.1f} mm beside the place that the "
+                      "robot says",
+                      name, placement.displaced.mm),
+          fmt::format("is touch-sd too small? give `touch-sd-mm {:.1f}` `touch-sd-deg {:.1f}`",
+                      placement.displaced.mm, 180.0 / std::numbers::pi * placement.displaced.rad)};
 }
 
 }  // namespace palpate

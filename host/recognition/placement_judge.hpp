@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "palpate/displacement.hpp"
+#include "palpate/pose.hpp"
 #include "recognition/recogniser.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/recognition_task.hpp"
@@ -34,10 +34,12 @@ std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,
                                               const Estimate& estimate, const RecognitionTask& task,
                                               const RecognitionStep& step);
 
-/// "the touches fit A where each lies some 1.1 mm beside the place that the robot says", or "the
-/// object seems to have moved by 1.1 mm after touch 5".
-std::string placement_words(const TouchPlacement& placement, const RecognitionTask& task);
-/// The warning: the same, and the remedy.
-std::string placement_warning(const TouchPlacement& placement, const RecognitionTask& task);
+struct PlacementWords {
+  /// "the touches fit A where each lies some 1.1 mm beside the place that the robot says", or "the
+  /// object seems to have moved by 1.1 mm after touch 5".
+  std::string finding;
+  std::string remedy;
+};
+PlacementWords words_of(const TouchPlacement& placement, const RecognitionTask& task);
 
 }  // namespace palpate

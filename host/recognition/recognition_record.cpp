@@ -12,14 +12,12 @@
 
 #include "estimation/lattice/refinement.hpp"
 #include "palpate/error.hpp"
-#include "palpate/object_frame.hpp"
+#include "palpate/occupancy_grid.hpp"
 #include "palpate/pose_error.hpp"
 #include "recognition/decision.hpp"
 #include "recognition/label_probability.hpp"
-#include "recognition/object_fit.hpp"
 #include "recognition/placement_judge.hpp"
 #include "recognition/scales.hpp"
-#include "recognition/warnings.hpp"
 
 namespace palpate {
 
@@ -81,36 +79,18 @@ RecognitionStep identity_after(Recogniser& recogniser, const RecognitionTask& ta
                refined_near(estimate.mode, recogniser, task));
 }
 
-/// What to say where symmetry_told() takes turns as equal that the map does not, or where a known
-/// pose error is such a turn; else none.
+/// What to say where symmetry_told() takes turns as equal that the map does not; else none.
 std::optional<std::string> turned_alike(const RecognitionTask& task, const RecognitionStep& step) {
-  constexpr double least_error_mm = 1.0;
   const OccupancyGrid& map = task.hypotheses[step.mode.object].map;
-  const int n = map.suggested_symmetry.value_or(1);
-  if (map.symmetry != 1 || n == 1) {
+  const int n = step.symmetry;
+  if (n == map.symmetry) {
     return {};
   }
-  const std::string alike =
-      fmt::format("{} looks the same after {}", map.label,
-                  n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n));
-  if (step.symmetry == n) {
-    return fmt::format(
-        "{}, and the touches do not tell such turns apart: they count as equal; build its map with "
-        "`symmetry {}` where they always are, with `symmetry 1` where they never are",
-        alike, n);
-  }
-  const std::optional<double> error_mm = step.pose_error_mm();
-  if (!error_mm) {
-    return {};
-  }
-  const double ignored_mm =
-      pose_error_mm(step.body.value(), n, step.pose(), *step.truth.T_object_robot);
-  return *error_mm - ignored_mm > least_error_mm
-             ? std::optional(
-                   fmt::format("{}, and the pose error of {:.2f} mm is {:.2f} mm where "
-                               "such turns do not count; build its map with `symmetry {}`",
-                               alike, *error_mm, ignored_mm, n))
-             : std::nullopt;
+  return fmt::format(
+      "{} looks the same after {}, and the touches do not tell such turns apart: they count as "
+      "equal; build its map with `symmetry {}` where they always are, with `symmetry 1` where they "
+      "never are",
+      map.label, n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n), n);
 }
 
 /// The touches, from 0, that disagree where all others fit the mode's object at the pose: by
@@ -175,8 +155,9 @@ void doubt_places(const Recogniser& recogniser, const Estimate& estimate,
   const bool all_after_a_move =
       placement && placement->moved_after + unlike.size() == touches.size();
   if (placement && (unlike.empty() || all_after_a_move)) {
-    step.decision = {false, placement_words(*placement, task)};
-    step.warnings.push_back(placement_warning(*placement, task));
+    const auto [finding, remedy] = words_of(*placement, task);
+    step.decision = {false, finding};
+    step.warnings.push_back(finding + ": " + remedy);
   } else if (!unlike.empty()) {
     step.warnings.push_back(unlike_words(unlike, task, step));
     if (placement) {

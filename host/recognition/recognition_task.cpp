@@ -59,14 +59,6 @@ RecognitionTask::RecognitionTask(std::vector<Hypothesis> objects, FilterOptions 
       label_of(label_indices(hypotheses, labels)),
       bodies(bodies_in(hypotheses)) {}
 
-std::int64_t RecognitionTask::bins_in_all() const {
-  // In float64, as counts of three axes may exceed an integer.
-  const double all = static_cast<double>(hypotheses.size()) * lattice().x_mm.count *
-                     lattice().y_mm.count * lattice().theta_rad.count;
-  constexpr double limit = 9e18;
-  return static_cast<std::int64_t>(std::min(all, limit));
-}
-
 std::string RecognitionTask::name_of(int object) const {
   const Hypothesis& hypothesis = hypotheses[static_cast<std::size_t>(object)];
   return hypothesis.map.label + (hypothesis.mirrored ? " mirrored" : "");

@@ -34,8 +34,6 @@ struct RecognitionTask {
   /// See FilterTraits.
   DisplacementSd touch_sd() const { return traits_of(filter).touch_sd; }
   DisplacementSd slip_sd() const { return traits_of(filter).slip_sd; }
-  /// Bins of all objects together.
-  std::int64_t bins_in_all() const;
   const ContactClassifier& classifier() const { return contact().classifier; }
   /// The label of a hypothesis, and that it is the mirrored one where it is.
   std::string name_of(int object) const;

@@ -21,6 +21,13 @@ Json to_json(const Pose& pose) {
           wrap_angle(pose.theta_rad, 2.0 * std::numbers::pi)};
 }
 
+/// x_mm, y_mm and theta_rad, as they are.
+Json named(const Pose& pose) {
+  return {{"x_mm", pose.translation_mm.x},
+          {"y_mm", pose.translation_mm.y},
+          {"theta_rad", pose.theta_rad}};
+}
+
 /// [3][3]
 Json to_json(const std::array<double, 9>& covariance) {
   auto rows = Json::array();
@@ -32,12 +39,10 @@ Json to_json(const std::array<double, 9>& covariance) {
 }
 
 Json to_json(const RecognitionStep& step, const RefinedPose& refined) {
-  return {{"T_robot_object", to_json(step.T_robot_object())},
-          {"sd", *step.sd()},
-          {"x_mm", refined.T_object_robot.translation_mm.x},
-          {"y_mm", refined.T_object_robot.translation_mm.y},
-          {"theta_rad", refined.T_object_robot.theta_rad},
-          {"covariance", to_json(refined.covariance)}};
+  Json json{{"T_robot_object", to_json(step.T_robot_object())}, {"sd", *step.sd()}};
+  json.update(named(refined.T_object_robot));
+  json["covariance"] = to_json(refined.covariance);
+  return json;
 }
 
 Json to_json(const BeliefMode& mode, const RecognitionTask& task) {
@@ -87,26 +92,21 @@ Json unknown_to_json(const Evaluation& evaluation) {
 
 Json to_json(const Median& median) { return {{"records", median.count}, {"median", median.value}}; }
 
-}  // namespace
-
-std::string verdict_text(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::fits:
-      return "fits";
-    case Verdict::doubtful:
-      return "doubtful";
-    case Verdict::does_not_fit:
-      break;
-  }
-  return "does not fit";
-}
-
+/// The truth as it was given.
 Json truth_to_json(const PartialTruth& truth) {
   Json json{{"object", truth.label}};
   if (truth.T_object_robot) {
     json["T_robot_object"] = to_json(inverse(*truth.T_object_robot));
   }
   return json;
+}
+
+}  // namespace
+
+std::string verdict_text(Verdict verdict) {
+  return verdict == Verdict::fits       ? "fits"
+         : verdict == Verdict::doubtful ? "doubtful"
+                                        : "does not fit";
 }
 
 Json to_json(const RecognitionStep& step, const RecognitionTask& task, OptionWords words) {
@@ -129,11 +129,9 @@ Json to_json(const RecognitionStep& step, const RecognitionTask& task, OptionWor
   }
   const Mode& mode = step.mode;
   json["mode"] = {{"object", task.labels[task.label_of[mode.object]]},
-                  {"map", task.map_paths[mode.object]},
-                  {"x_mm", mode.T_object_robot.translation_mm.x},
-                  {"y_mm", mode.T_object_robot.translation_mm.y},
-                  {"theta_rad", mode.T_object_robot.theta_rad},
-                  {"log_likelihood", mode.log_likelihood}};
+                  {"map", task.map_paths[mode.object]}};
+  json["mode"].update(named(mode.T_object_robot));
+  json["mode"]["log_likelihood"] = mode.log_likelihood;
   const Hypothesis& hypothesis = task.hypotheses[static_cast<std::size_t>(mode.object)];
   if (hypothesis.map.mirror) {
     json["mode"]["mirrored"] = hypothesis.mirrored;
@@ -267,18 +265,15 @@ Json to_json(const Evaluation& evaluation, const JudgedResults& results) {
 }
 
 Json to_json(const PlannedTouch& touch) {
-  const Pose& pose = touch.T_robot_sensor;
   const TouchGain::StandardError& error = touch.gain.standard_error;
-  return {{"index", touch.index},
-          {"x_mm", pose.translation_mm.x},
-          {"y_mm", pose.translation_mm.y},
-          {"theta_rad", pose.theta_rad},
-          {"gain",
-           {{"identity", touch.gain.identity},
-            {"pose", touch.gain.pose},
-            {"both", touch.gain.both()},
-            {"standard_error",
-             {{"identity", error.identity}, {"pose", error.pose}, {"both", error.both}}}}}};
+  Json json{{"index", touch.index}};
+  json.update(named(touch.T_robot_sensor));
+  json["gain"] = {{"identity", touch.gain.identity},
+                  {"pose", touch.gain.pose},
+                  {"both", touch.gain.both()},
+                  {"standard_error",
+                   {{"identity", error.identity}, {"pose", error.pose}, {"both", error.both}}}};
+  return json;
 }
 
 Json to_json(const Plan& plan, const RecognitionTask& task, const std::string& device,
@@ -294,10 +289,11 @@ Json to_json(const Plan& plan, const RecognitionTask& task, const std::string& d
   for (const PlannedTouch& touch : plan.ranked) {
     json["candidates"].push_back(to_json(touch));
   }
-  std::vector<std::string> warnings = warnings_of(plan);
-  std::ranges::transform(warnings, warnings.begin(), words);
-  if (!warnings.empty()) {
-    json["warnings"] = warnings;
+  if (json["believed"].contains("warnings")) {
+    json["warnings"] = json["believed"]["warnings"];
+  }
+  if (const std::string limit = limit_words(plan); !limit.empty()) {
+    json["warnings"].push_back(words(limit));
   }
   json["samples"] = plan.samples.size();
   json["seed"] = plan.seed;
@@ -320,14 +316,10 @@ Json to_json(const SetupFinding& finding, OptionWords words) {
 }
 
 Json to_json(const LiveTouch& touch, const RecognitionTask& task) {
-  const Pose& pose = *touch.touch.T_robot_sensor;
   Json json{{"time", 0.5 * (touch.touch.begin_s + touch.touch.end_s)},
             {"unknown", touch.unknown},
             {"touch", touch.index},
-            {"pose",
-             {{"x_mm", pose.translation_mm.x},
-              {"y_mm", pose.translation_mm.y},
-              {"theta_rad", pose.theta_rad}}}};
+            {"pose", named(*touch.touch.T_robot_sensor)}};
   json.update(to_json(touch.step, task));
   if (!touch.step.truth.label.empty()) {
     json["truth"] = truth_to_json(touch.step.truth);

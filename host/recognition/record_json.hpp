@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "model/option_words.hpp"
-#include "palpate/setup_finding.hpp"
+#include "palpate/touch.hpp"
 #include "recognition/evaluation.hpp"
 #include "recognition/judged_results.hpp"
 #include "recognition/live_recognition.hpp"
@@ -18,8 +18,6 @@ namespace palpate {
 /// "fits", "doubtful" or "does not fit".
 std::string verdict_text(Verdict verdict);
 
-/// The truth as it was given: the object and, where it is known, T_robot_object [x, y, theta].
-nlohmann::ordered_json truth_to_json(const PartialTruth& truth);
 /// One step in the form that other programs rely on.
 /// @param words of the options that its warnings name
 nlohmann::ordered_json to_json(const RecognitionStep& step, const RecognitionTask& task,

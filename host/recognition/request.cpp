@@ -10,7 +10,6 @@
 
 #include "io/input_file.hpp"
 #include "options/option.hpp"
-#include "options/refused_option.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate {
@@ -138,20 +137,12 @@ std::vector<std::pair<std::string, std::filesystem::path>> files_of(const Reques
 }
 
 std::vector<std::filesystem::path> maps_in(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::vector<std::filesystem::path> files;
-  const std::filesystem::directory_iterator entries(folder, error);
-  if (error) {
-    refuse(folder, "cannot be read: {}; check its permissions", error.message());
-  }
-  for (const auto& entry : entries) {
-    // A look into each file would take as long as reading it.
-    if (entry.path().filename().string().ends_with(".map.h5") ||
-        (entry.path().extension() == ".h5" && read_format(entry.path()) == "palpate.map")) {
-      files.push_back(entry.path());
-    }
-  }
-  std::sort(files.begin(), files.end());
+  std::vector<std::filesystem::path> files = paths_in(folder);
+  // A look into each file would take as long as reading it.
+  std::erase_if(files, [](const std::filesystem::path& file) {
+    return !file.filename().string().ends_with(".map.h5") &&
+           (file.extension() != ".h5" || read_format(file) != "palpate.map");
+  });
   return files;
 }
 

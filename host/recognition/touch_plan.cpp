@@ -14,7 +14,7 @@
 #include "io/pose_table.hpp"
 #include "io/recording_rules.hpp"
 #include "model/bounding_box.hpp"
-#include "options/refused_option.hpp"
+#include "options/option.hpp"
 #include "palpate/files.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/touch.hpp"
@@ -298,21 +298,12 @@ std::string limit_words(const Plan& plan) {
   if (gain <= gain_for(unknown, plan.goal) + least_gain_nats) {
     return "";
   }
-  return plan.goal == PlanGoal::identity
-             ? fmt::format(
-                   "the best gain is above what is unknown: {} samples stand for the belief only "
-                   "roughly; give more `samples`",
-                   samples)
-             : "the best gain is above what is unknown, which is counted in bins: the touch tells "
-               "also where in its bin the pose is";
-}
-
-std::vector<std::string> warnings_of(const Plan& plan) {
-  std::vector<std::string> warnings = plan.record.last().warnings;
-  if (const std::string limit = limit_words(plan); !limit.empty()) {
-    warnings.push_back(limit);
-  }
-  return warnings;
+  return fmt::format(
+      "the best gain is above what is unknown, which is counted in bins: the touch tells also "
+      "where "
+      "in its bin the pose is, or {} samples stand for the belief only roughly; give more "
+      "`samples`",
+      samples);
 }
 
 }  // namespace palpate

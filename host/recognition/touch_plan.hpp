@@ -11,7 +11,6 @@
 #include <glm/vec2.hpp>
 
 #include "palpate/estimate.hpp"
-#include "palpate/plan.hpp"
 #include "palpate/pose.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/recognition_task.hpp"
@@ -107,7 +106,5 @@ Plan plan_touch(Recogniser& recogniser, const RecognitionTask& task, const Query
                 const PlanRequest& request, const std::function<void(double)>& progress = {});
 /// Why the gains are no more exact; "" where nothing is to be said.
 std::string limit_words(const Plan& plan);
-/// What looks wrong with the touches, then limit_words().
-std::vector<std::string> warnings_of(const Plan& plan);
 
 }  // namespace palpate

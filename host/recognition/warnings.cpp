@@ -1,5 +1,3 @@
-#include "recognition/warnings.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,6 +16,7 @@
 #include "model/bounding_box.hpp"
 #include "model/element_spacing.hpp"
 #include "recognition/belief_cells.hpp"
+#include "recognition/decision.hpp"
 
 namespace palpate {
 

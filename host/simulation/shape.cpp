@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -14,7 +15,7 @@
 #include "model/bounding_box.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 #include "palpate/simulation.hpp"
 #include "simulation/spans.hpp"
 
@@ -132,19 +133,14 @@ std::vector<Shape::Stroke> glyph_strokes(char character) {
   return strokes;
 }
 
-[[noreturn]] void refuse(const std::filesystem::path& path, int line, const std::string& why) {
-  throw Error(Fault::input, fmt::format("{}:{}: {}", path.string(), line, why));
-}
-
 /// The polygons of a text file in mm, in the format that make_shape() describes.
 /// @throws Error naming the file and line
 std::vector<std::vector<glm::dvec2>> read_polygons(const std::filesystem::path& path) {
   std::ifstream file(path);
   if (!file) {
-    throw Error(
-        Fault::input,
-        fmt::format("{}: cannot be opened; check the path and its permissions", path.string()));
+    refuse(path, "cannot be opened; check the path and its permissions");
   }
+  const auto place = [&](int line) { return fmt::format("{}:{}", path.string(), line); };
   std::vector<std::vector<glm::dvec2>> polygons;
   std::vector<glm::dvec2> polygon;
   int first_line = 0;
@@ -152,47 +148,36 @@ std::vector<std::vector<glm::dvec2>> read_polygons(const std::filesystem::path& 
     if (polygon.empty()) {
       return;
     }
-    if (polygon.size() < 3) {
-      refuse(path, first_line,
-             fmt::format("polygon of {} vertices: give at least 3", polygon.size()));
+    if (polygon.size() < 3 || !encloses_area(polygon)) {
+      refuse(place(first_line), "polygon of {} vertices{}", polygon.size(),
+             polygon.size() < 3 ? ": give at least 3" : " on one line: give it an area");
     }
-    if (!encloses_area(polygon)) {
-      refuse(path, first_line,
-             fmt::format("polygon of {} vertices on one line: give it an area", polygon.size()));
-    }
-    polygons.push_back(std::move(polygon));
-    polygon.clear();
+    polygons.push_back(std::exchange(polygon, {}));
   };
 
+  const auto is_blank = [](std::string_view part) {
+    return part.find_first_not_of(" \t\r") == part.npos;
+  };
   std::string text;
   for (int line = 1; std::getline(file, text); ++line) {
-    constexpr const char* blanks = " \t\r";
-    if (text.find_first_not_of(blanks) == std::string::npos) {
+    const std::string row = text.substr(0, text.find('#'));
+    if (is_blank(text)) {
       finish_polygon();
-      continue;
+    } else if (!is_blank(row)) {
+      const auto vertex = two_numbers_of(row);
+      if (!vertex) {
+        refuse(place(line), "'{:.40}': write a vertex as two finite numbers, x y, in mm", row);
+      }
+      first_line = polygon.empty() ? line : first_line;
+      polygon.emplace_back((*vertex)[0], (*vertex)[1]);
     }
-    text.resize(std::min(text.find('#'), text.size()));
-    if (text.find_first_not_of(blanks) == std::string::npos) {
-      continue;
-    }
-    const auto vertex = two_numbers_of(text);
-    if (!vertex) {
-      refuse(path, line,
-             fmt::format("'{:.40}': write a vertex as two finite numbers, x y, in mm", text));
-    }
-    if (polygon.empty()) {
-      first_line = line;
-    }
-    polygon.emplace_back((*vertex)[0], (*vertex)[1]);
   }
   if (file.bad()) {
-    throw Error(Fault::input, fmt::format("{}: cannot be read; copy it again", path.string()));
+    refuse(path, "cannot be read; copy it again");
   }
   finish_polygon();
   if (polygons.empty()) {
-    throw Error(Fault::input, fmt::format("{}: holds no polygon; write one vertex 'x y' in mm per "
-                                          "line",
-                                          path.string()));
+    refuse(path, "holds no polygon; write one vertex 'x y' in mm per line");
   }
   return polygons;
 }
@@ -237,9 +222,9 @@ Shape make_shape(const std::string& name_or_file) {
   const std::filesystem::path path(name_or_file);
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored) || std::filesystem::is_directory(path, ignored)) {
-    throw Error(Fault::input, fmt::format("shape '{}': not a file and no shape of that name; give "
-                                          "A to Z, 0 to 9, ring, bar or a polygon file",
-                                          name_or_file));
+    refuse(
+        fmt::format("shape '{}'", name_or_file),
+        "not a file and no shape of that name; give A to Z, 0 to 9, ring, bar or a polygon file");
   }
   return {.label = printable(path.stem().string()), .strokes = {}, .polygons = read_polygons(path)};
 }

@@ -12,7 +12,7 @@
 #include "model/bounding_box.hpp"
 #include "model/own_process.hpp"
 #include "model/random.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/simulation.hpp"
 #include "simulation/spans.hpp"
@@ -159,21 +159,20 @@ void validate(const SensorModel& model) {
         Field{"gain_spread", model.gain_spread, true}, Field{"noise_kpa", model.noise_kpa, true}}) {
     // Written so that NaN is refused.
     if (!(may_be_0 ? value >= 0.0 : value > 0.0) || value > largest) {
-      throw Error(Fault::input, fmt::format("sensor {} = {}: give a number {} 0, at most {}", name,
-                                            value, may_be_0 ? "from" : "above", largest));
+      refuse(fmt::format("sensor {} = {}", name, value), "give a number {} 0, at most {}",
+             may_be_0 ? "from" : "above", largest);
     }
   }
 }
 
 void validate(const std::vector<glm::dvec2>& elements_mm) {
   if (elements_mm.empty()) {
-    throw Error(Fault::input, "array without elements: give at least one position in mm");
+    refuse("array without elements", "give at least one position in mm");
   }
   for (std::size_t i = 0; i < elements_mm.size(); ++i) {
     const glm::dvec2& p = elements_mm[i];
     if (!std::isfinite(p.x) || !std::isfinite(p.y)) {
-      throw Error(Fault::input,
-                  fmt::format("array element {} at {},{}: give finite numbers", i, p.x, p.y));
+      refuse(fmt::format("array element {} at {},{}", i, p.x, p.y), "give finite numbers");
     }
   }
 }
@@ -255,7 +254,7 @@ std::vector<Pose> training_grid() {
 
 std::vector<Pose> random_poses(int n, std::uint64_t seed) {
   if (n < 0) {
-    throw Error(Fault::input, fmt::format("number of random poses = {}: give zero or more", n));
+    refuse(fmt::format("number of random poses = {}", n), "give zero or more");
   }
   Random random(seed, Stream::touch_poses);
   std::vector<Pose> poses(n);

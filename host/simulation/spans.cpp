@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
+#include "model/refuse.hpp"
 #include "palpate/drawn_map.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -91,11 +91,10 @@ BoundingBox bounds_of(const Shape& shape) {
     // a cell there.
     if (!(std::abs(p.x) <= most_length_mm && std::abs(p.y) <= most_length_mm && width_mm >= 0.0 &&
           width_mm <= most_length_mm)) {
-      throw Error(
-          Fault::input,
-          fmt::format("shape '{}': point {},{} of a line {} mm wide: give coordinates within "
-                      "{} mm of 0 and a width that is not negative",
-                      shape.label, p.x, p.y, width_mm, most_length_mm));
+      refuse(fmt::format("shape '{}'", shape.label),
+             "point {},{} of a line {} mm wide: give coordinates within {} mm of 0 and a width "
+             "that is not negative",
+             p.x, p.y, width_mm, most_length_mm);
     }
     box.take_in(p - width_mm / 2.0);
     box.take_in(p + width_mm / 2.0);
@@ -112,8 +111,7 @@ BoundingBox bounds_of(const Shape& shape) {
   }
   if (!(box.lower.x < box.upper.x && box.lower.y < box.upper.y) ||
       (shape.strokes.empty() && std::ranges::none_of(shape.polygons, encloses_area))) {
-    throw Error(Fault::input,
-                fmt::format("shape '{}': covers no area, so it cannot be touched", shape.label));
+    refuse(fmt::format("shape '{}'", shape.label), "covers no area, so it cannot be touched");
   }
   return box;
 }
@@ -146,9 +144,9 @@ Mask mask_of(const Shape& shape, double pixel_mm) {
   const BoundingBox box = bounds_of(shape);
   const glm::dvec2 pixels = glm::ceil(box.extent() / pixel_mm);
   if (!(pixels.x * pixels.y <= most_pixels)) {
-    throw Error(Fault::input, fmt::format("shape '{}': {:.3g} x {:.3g} pixels of {} mm are more "
-                                          "than {:g}; use larger cells",
-                                          shape.label, pixels.x, pixels.y, pixel_mm, most_pixels));
+    refuse(fmt::format("shape '{}'", shape.label),
+           "{:.3g} x {:.3g} pixels of {} mm are more than {:g}; use larger cells", pixels.x,
+           pixels.y, pixel_mm, most_pixels);
   }
   Mask mask{.pixel_mm = pixel_mm,
             .origin_mm = box.lower + pixel_mm / 2.0,

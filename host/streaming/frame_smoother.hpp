@@ -33,7 +33,6 @@ class FrameSmoother {
     append(time_s, pressure);
     while (window_.size() > 1 &&
            (window_.size() > most_frames || window_.front().time_s <= time_s - smooth_s_)) {
-      spare_.push_back(std::move(window_.front().values));
       window_.pop_front();
     }
     take_means(time_s);
@@ -44,10 +43,7 @@ class FrameSmoother {
   const std::vector<double>& means() const { return mean_; }
   /// Forgets every frame.
   void reset() {
-    while (!window_.empty()) {
-      spare_.push_back(std::move(window_.front().values));
-      window_.pop_front();
-    }
+    window_.clear();
     recent_.clear();
   }
 
@@ -76,12 +72,7 @@ class FrameSmoother {
   void append(double time_s, const std::vector<double>& pressure) {
     const std::size_t e = pressure.size();
     recent_.resize(e);
-    std::vector<double> middle;
-    if (!spare_.empty()) {
-      middle = std::move(spare_.back());
-      spare_.pop_back();
-    }
-    middle.assign(e, std::numeric_limits<double>::quiet_NaN());
+    std::vector<double> middle(e, std::numeric_limits<double>::quiet_NaN());
     bool whole = true;
     for (std::size_t i = 0; i < e; ++i) {
       if (std::isnan(pressure[i])) {
@@ -135,10 +126,9 @@ class FrameSmoother {
   double largest_gap_s_;
   std::vector<Recent> recent_;  ///< [e]
   std::deque<Medians> window_;
-  std::vector<std::vector<double>> spare_;  ///< memory for the next medians
-  std::vector<double> sum_;                 ///< [e] of the window
-  std::vector<double> known_;               ///< [e] known medians of frames that are not whole
-  std::vector<double> mean_;                ///< [e]
+  std::vector<double> sum_;    ///< [e] of the window
+  std::vector<double> known_;  ///< [e] known medians of its frames that are not whole
+  std::vector<double> mean_;   ///< [e]
 };
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-#include "streaming/import_array.hpp"
+#include "streaming/import_steps.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -20,13 +20,14 @@ namespace {
 
 /// COLUMNS:ROWS:PITCH or COLUMNSxROWSxPITCH.
 struct Grid {
-  int columns = 0;
-  int rows = 0;
+  std::size_t columns = 0;
+  std::size_t rows = 0;
   double pitch_mm = 0.0;
 };
 
-/// None where the text names a file.
-std::optional<Grid> grid_of(const std::string& text) {
+/// The grid of `array`; none where it names a file, or a program gives the elements.
+std::optional<Grid> grid_of(const ImportOptions& options) {
+  const std::string& text = options.array;
   std::vector<std::string_view> parts = split_text(text, ':');
   if (parts.size() != 3) {
     parts = split_text(text, 'x');
@@ -35,7 +36,7 @@ std::optional<Grid> grid_of(const std::string& text) {
     }
   }
   const auto columns = parts.size() == 3 ? whole_number_of(parts[0]) : std::nullopt;
-  if (!columns) {
+  if (!columns || options.elements_mm) {
     return {};
   }
   constexpr std::int64_t limit = 1024;
@@ -48,11 +49,12 @@ std::optional<Grid> grid_of(const std::string& text) {
            "1000 mm, or a file",
            limit);
   }
-  return Grid{static_cast<int>(*columns), static_cast<int>(*rows), *pitch_mm};
+  return Grid{static_cast<std::size_t>(*columns), static_cast<std::size_t>(*rows), *pitch_mm};
 }
 
 /// The grid's elements in the order in which they are read.
-ArrayTable grid_array_of(const Grid& grid, const std::string& first, const std::string& order) {
+std::vector<glm::dvec2> elements_of(const Grid& grid, const std::string& first,
+                                    const std::string& order) {
   const bool top = first == "top-left" || first == "top-right";
   const bool right = first == "bottom-right" || first == "top-right";
   if (!top && !right && first != "bottom-left") {
@@ -63,22 +65,22 @@ ArrayTable grid_array_of(const Grid& grid, const std::string& first, const std::
   if (order != "rows" && order != "columns") {
     refuse(fmt::format("`order {}`", order), "give rows or columns");
   }
-  const std::vector<glm::dvec2> by_place = grid_array(grid.columns, grid.rows, grid.pitch_mm);
-  ArrayTable array;
-  const auto columns = static_cast<std::size_t>(grid.columns);
-  const auto rows = static_cast<std::size_t>(grid.rows);
+  const auto& [columns, rows, pitch_mm] = grid;
+  const std::vector<glm::dvec2> by_place =
+      grid_array(static_cast<int>(columns), static_cast<int>(rows), pitch_mm);
+  std::vector<glm::dvec2> elements_mm;
   for (std::size_t e = 0; e < by_place.size(); ++e) {
     const std::size_t i = order == "rows" ? e % columns : e / rows;
     const std::size_t j = order == "rows" ? e / columns : e % rows;
     const std::size_t column = right ? columns - 1 - i : i;
     const std::size_t row = top ? rows - 1 - j : j;
-    array.elements_mm.push_back(by_place[row * columns + column]);
+    elements_mm.push_back(by_place[row * columns + column]);
   }
-  return array;
+  return elements_mm;
 }
 
 /// Marks the elements of "13,42" as dead.
-void mark_dead(const std::string& dead, ArrayTable& array) {
+void mark_dead(const std::string& dead, Recording& array) {
   if (dead.empty()) {
     return;
   }
@@ -98,35 +100,27 @@ void mark_dead(const std::string& dead, ArrayTable& array) {
 }  // namespace
 
 std::optional<std::array<std::size_t, 2>> grid_size(const ImportOptions& options) {
-  const std::optional<Grid> grid = options.elements_mm ? std::nullopt : grid_of(options.array);
-  return grid && grid->rows > 1 ? std::optional(std::array{static_cast<std::size_t>(grid->columns),
-                                                           static_cast<std::size_t>(grid->rows)})
+  const std::optional<Grid> grid = grid_of(options);
+  return grid && grid->rows > 1 ? std::optional(std::array{grid->columns, grid->rows})
                                 : std::nullopt;
 }
 
-ArrayTable import_array(const ImportOptions& options) {
+Recording import_array(const ImportOptions& options) {
   if (options.pressure_unit != "kPa" && options.pressure_unit != "raw") {
     refuse(fmt::format("`pressure-unit {}`", options.pressure_unit), "give kPa or raw");
   }
-  ArrayTable array;
-  const std::optional<Grid> grid = options.elements_mm ? std::nullopt : grid_of(options.array);
-  if (grid) {
-    array = grid_array_of(*grid, options.first_element, options.order);
+  Recording array;
+  if (const std::optional<Grid> grid = grid_of(options)) {
+    array.elements_mm = elements_of(*grid, options.first_element, options.order);
   } else {
-    for (const auto& [option, is_default] :
-         {std::pair{"first-element", options.first_element == ImportOptions{}.first_element},
-          std::pair{"order", options.order == ImportOptions{}.order}}) {
-      if (!is_default) {
-        refuse(fmt::format("`{}`", option),
-               "is for a grid, COLUMNS:ROWS:PITCH; the elements of a file or of a program have "
-               "their places");
-      }
+    const bool has_first = options.first_element != ImportOptions{}.first_element;
+    if (has_first || options.order != ImportOptions{}.order) {
+      refuse(has_first ? "`first-element`" : "`order`",
+             "is for a grid, COLUMNS:ROWS:PITCH; the elements of a file or of a program have "
+             "their places");
     }
-    if (options.elements_mm) {
-      array.elements_mm = *options.elements_mm;
-    } else {
-      array = read_array(options.array);
-    }
+    array = options.elements_mm ? Recording{.elements_mm = *options.elements_mm}
+                                : read_array(options.array);
   }
   if (array.elements_mm.empty()) {
     refuse("array", "has no element; give centres [e, 2] in mm, e at least 1");
@@ -147,15 +141,17 @@ void mark_unknown(const std::string& path, const ImportSurvey& survey, Recording
   if (!recording.valid.empty() || std::ranges::count(read, 0) > 0) {
     recording.valid = read;
   }
-  bool some_unknown = false;
-  for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-    some_unknown = some_unknown || (read[k % e] != 0 && std::isnan(recording.pressure[k]));
+  if (recording.rows != "touches") {
+    return;
   }
-  if (some_unknown && recording.rows == "touches") {
-    recording.valid.resize(recording.pressure.size());
-    for (std::size_t k = 0; k < recording.pressure.size(); ++k) {
-      recording.valid[k] = std::isnan(recording.pressure[k]) ? 0 : read[k % e];
-    }
+  bool some_unknown = false;
+  std::vector<std::uint8_t> valid(recording.pressure.size());
+  for (std::size_t k = 0; k < valid.size(); ++k) {
+    valid[k] = std::isnan(recording.pressure[k]) ? 0 : read[k % e];
+    some_unknown = some_unknown || valid[k] != read[k % e];
+  }
+  if (some_unknown) {
+    recording.valid = std::move(valid);
   }
 }
 

@@ -31,6 +31,7 @@ LineSensor::LineSensor(SensorDescription description, PosedSensor::Warn warn, in
       warn_(std::move(warn)),
       sign_(sign),
       format_(description_.elements_mm.size()),
+      flaws_(warn_),
       reader_("frames", "-", 4096 + most_bytes_per_reading * description_.elements_mm.size(),
               [this](const LineReader::Line& line) { take(line); }) {}
 
@@ -59,9 +60,8 @@ std::optional<Frame> LineSensor::next(std::chrono::milliseconds timeout) {
 }
 
 void LineSensor::take(const LineReader::Line& line) {
-  using Kind = FrameLines::Flaw::Kind;
   if (line.too_long) {
-    refuse_line(line, Kind::malformed, "is longer than any frame");
+    refuse_line(line, {.words = "is longer than any frame"});
     return;
   }
   const double read_s = host_clock_s();
@@ -74,8 +74,8 @@ void LineSensor::take(const LineReader::Line& line) {
     }
   }
   if (const auto* flaw = std::get_if<FrameLines::Flaw>(&read)) {
-    if (!may_stand_before(line, flaw->words)) {
-      refuse_line(line, flaw->kind, flaw->words);
+    if (!may_stand_before(line, *flaw)) {
+      refuse_line(line, *flaw);
     }
   } else if (auto* frame = std::get_if<Frame>(&read)) {
     say_first(read_s, frame->host_time_s);
@@ -91,7 +91,7 @@ void LineSensor::take(const LineReader::Line& line) {
 }
 
 /// Leaves out a line before the first frame that a board prints as it starts.
-bool LineSensor::may_stand_before(const LineReader::Line& line, const std::string& flaw) {
+bool LineSensor::may_stand_before(const LineReader::Line& line, const FrameLines::Flaw& flaw) {
   constexpr std::uint64_t limit = 100;
   const bool is_cut = line.number == 1 && !trimmed(line.text).starts_with('{');
   if (counters_.frames > 0 || before_ == limit || !(is_cut || FrameLines::is_text(line.text))) {
@@ -128,42 +128,33 @@ void LineSensor::say_first(double now_s, double time_s) {
   }
   // Times since 1970 show their unit by their size, others by how far frames lie apart.
   const double step_s = (first_s_.back() - first_s_.front()) / static_cast<double>(enough - 1);
-  const char* unit = nullptr;
-  if (time_s > latest_s) {
-    unit = time_s > 1e17 ? "nanoseconds" : time_s > 1e14 ? "microseconds" : "milliseconds";
-  } else if (step_s >= 1.0) {
-    unit = step_s >= 1e6 ? "nanoseconds" : step_s >= 1e3 ? "microseconds" : "milliseconds";
-  }
-  if (unit != nullptr) {
+  if (time_s > latest_s || step_s >= 1.0) {
+    const double per_s = time_s > latest_s ? time_s / latest_s : step_s;
     warn_(fmt::format(
         "{}: its frames are {:.3g} s apart by their times, which look like {}; write seconds",
-        reader_.name(), step_s, unit));
+        reader_.name(), step_s,
+        per_s >= 1e6   ? "nanoseconds"
+        : per_s >= 1e3 ? "microseconds"
+                       : "milliseconds"));
   }
 }
 
-std::string LineSensor::words_about(const LineReader::Line& line, const std::string& flaw) const {
+std::string LineSensor::words_about(const LineReader::Line& line,
+                                    const FrameLines::Flaw& flaw) const {
   return fmt::format(
       "{}, line {}: {}; write {{\"time\": s, \"pressure\": [{} numbers]}}, or CSV with {} "
       "readings, behind their time where it is known",
-      reader_.name(), line.number, flaw, format_.elements(), format_.elements());
+      reader_.name(), line.number, flaw.words, format_.elements(), format_.elements());
 }
 
-void LineSensor::refuse_line(const LineReader::Line& line, FrameLines::Flaw::Kind kind,
-                             const std::string& flaw) {
+void LineSensor::refuse_line(const LineReader::Line& line, const FrameLines::Flaw& flaw) {
   const std::string text = words_about(line, flaw);
   if (counters_.frames == 0) {
     throw Error(Fault::input, text);
   }
-  ++refused_;
   ++lost_before_;
   ++counters_.lost;
-  if (first_refused_.empty()) {
-    first_refused_ = text;
-  }
-  if (warn_ && !told_[static_cast<std::size_t>(kind)]) {
-    warn_(text);
-  }
-  told_.set(static_cast<std::size_t>(kind));
+  flaws_.add(flaw.kind, text);
 }
 
 }  // namespace palpate

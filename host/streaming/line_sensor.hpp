@@ -1,6 +1,5 @@
 #pragma once
 
-#include <bitset>
 #include <cstdint>
 #include <deque>
 #include <string>
@@ -31,16 +30,15 @@ class LineSensor : public Sensor {
   void stop() override {}
   SensorCounters counters() const override { return counters_; }
 
-  std::uint64_t refused() const { return refused_; }  ///< lines
-  const std::string& first_refused() const { return first_refused_; }
+  std::uint64_t refused() const { return counters_.lost; }  ///< lines
+  const std::string& first_refused() const { return flaws_.first(); }
 
  private:
   void take(const LineReader::Line& line);
-  bool may_stand_before(const LineReader::Line& line, const std::string& flaw);
-  std::string words_about(const LineReader::Line& line, const std::string& flaw) const;
+  bool may_stand_before(const LineReader::Line& line, const FrameLines::Flaw& flaw);
+  std::string words_about(const LineReader::Line& line, const FrameLines::Flaw& flaw) const;
   void say_first(double now_s, double time_s);
-  void refuse_line(const LineReader::Line& line, FrameLines::Flaw::Kind kind,
-                   const std::string& flaw);
+  void refuse_line(const LineReader::Line& line, const FrameLines::Flaw& flaw);
 
   SensorDescription description_;
   PosedSensor::Warn warn_;
@@ -54,9 +52,7 @@ class LineSensor : public Sensor {
   std::string flaw_before_;        ///< why it is no frame
   std::vector<double> first_s_;    ///< times of the first frames, of those that have one
   std::uint64_t lost_before_ = 0;  ///< lines refused since the last frame
-  std::uint64_t refused_ = 0;
-  std::string first_refused_;
-  std::bitset<4> told_;  ///< kinds of refused lines
+  RefusedLines flaws_;
   LineReader reader_;
 };
 

@@ -1,4 +1,4 @@
-#include "streaming/pose_join.hpp"
+#include "streaming/import_steps.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -154,17 +154,12 @@ void join(PoseTable poses, const ImportSurvey& survey, const ImportOptions& opti
     }
     return;
   }
-  if (poses.T_robot_sensor.size() != n && in_one_file(options)) {
-    refuse(options.poses,
-           "has {} rows of readings for {} frames or touches; give the poses in a table of their "
-           "own, with a row for each",
-           poses.T_robot_sensor.size(), n);
-  }
   if (poses.T_robot_sensor.size() != n) {
-    refuse(options.poses,
-           "holds {} poses without a time for {} rows of {}; write one for each row, or give both "
-           "a column 'time'",
-           poses.T_robot_sensor.size(), n, options.pressures);
+    refuse(
+        options.poses,
+        "holds {} poses without a time for {} frames or touches of {}; write a table with one for "
+        "each, or give both a column 'time'",
+        poses.T_robot_sensor.size(), n, options.pressures);
   }
   find_clock(poses, survey, options, imported);
   recording.T_robot_sensor = std::move(poses.T_robot_sensor);

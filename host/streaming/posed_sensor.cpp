@@ -1,10 +1,8 @@
 #include <algorithm>
-#include <bitset>
 #include <chrono>
 #include <cstdint>
 #include <deque>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -20,154 +18,11 @@ namespace {
 
 // No pose has so long a line.
 constexpr std::size_t longest_line = 4096;
-// PoseReader::read() takes at most so many blocks of the lines' reader.
+// read_poses() takes at most so many blocks of the lines' reader.
 constexpr int blocks_at_once = 4;
 
-/// Reads lines of poses into a track as they come: see PosedSensor.
-class PoseReader {
- public:
-  /// @param name path of a file or FIFO, or "-": standard input
-  /// @param warn called for the first refused line of each kind; may be empty
-  /// @throws Error where `name` cannot be read, or a line of a file is refused
-  PoseReader(const std::string& name, PoseTrack& track, PosedSensor::Warn warn)
-      : track_(track),
-        warn_(std::move(warn)),
-        lines_("poses", name, longest_line, [this](const LineReader::Line& line) { take(line); }) {
-    while (is_file() && read_some()) {
-    }
-  }
-
-  PoseReader(const PoseReader&) = delete;
-  PoseReader& operator=(const PoseReader&) = delete;
-
-  /// Reads what has come, without waiting and at most 64 KiB, so that a flood does not block the
-  /// caller.
-  void read() {
-    for (int block = 0; block < blocks_at_once && read_some(); ++block) {
-    }
-  }
-
-  /// True where no more poses will come.
-  bool ended() const { return ended_; }
-  /// True where the poses come from a file; all of them are then in the track.
-  bool is_file() const { return lines_.is_file(); }
-  /// Poses that joined the track.
-  std::uint64_t poses() const { return poses_ - track_.dropped() - track_.set_aside(); }
-  /// Lines that were refused.
-  std::uint64_t refused() const { return malformed_ + track_.dropped(); }
-  const std::string& first_refused() const { return first_refused_; }
-
- private:
-  /// What may be wrong with a line.
-  enum class LineFlaw {
-    too_long,
-    no_pose,
-    no_number,
-    far_away,
-    out_of_order,
-    clock_set_back,
-    kinds
-  };
-
-  // Reads one block; false where there is none, or none yet.
-  bool read_some() {
-    const bool some = lines_.read_some();
-    if (lines_.ended() && !std::exchange(ended_, true)) {
-      const std::uint64_t dropped = track_.dropped();
-      track_.end();
-      judge_order(dropped, track_.set_back());
-    }
-    return some;
-  }
-
-  void take(const LineReader::Line& line) {
-    line_ = line.number;
-    if (line.too_long) {
-      refuse_line(LineFlaw::too_long, line_, "is longer than any pose");
-      return;
-    }
-    const auto read = format_.read(line.text, 0.0);
-    if (const auto* flaw = std::get_if<FrameLines::Flaw>(&read)) {
-      using Kind = FrameLines::Flaw::Kind;
-      refuse_line(flaw->kind == Kind::malformed   ? LineFlaw::no_pose
-                  : flaw->kind == Kind::no_number ? LineFlaw::no_number
-                                                  : LineFlaw::far_away,
-                  line_, flaw->words);
-    } else if (const auto* frame = std::get_if<Frame>(&read)) {
-      add(frame->host_time_s, *frame->T_robot_sensor);
-    }
-  }
-
-  void add(double time_s, const Pose& T_robot_sensor) {
-    const std::uint64_t dropped = track_.dropped();
-    const std::uint64_t set_back = track_.set_back();
-    const double before_s = track_.last_s().value_or(time_s);
-    ++poses_;
-    track_.add(time_s, T_robot_sensor);
-    judge_order(dropped, set_back);
-    if (track_.set_aside() == 1) {
-      aside_ = {.line = line_, .time_s = time_s, .before_s = before_s};
-    }
-  }
-
-  // Reports what the track did with the poses that it had set aside.
-  void judge_order(std::uint64_t dropped_before, std::uint64_t set_back_before) {
-    const bool early = aside_.time_s <= aside_.before_s;
-    if (track_.dropped() != dropped_before) {
-      refuse_line(LineFlaw::out_of_order, aside_.line,
-                  fmt::format("time = {} s is {} the poses around it, at {} s", aside_.time_s,
-                              early ? "not later than" : "far later than", aside_.before_s));
-    }
-    if (track_.set_back() != set_back_before) {
-      const std::string words = fmt::format(
-          "time = {} s is not later than the pose before, at {} s, and the poses after "
-          "it go on from there: the robot's clock was set",
-          aside_.time_s, aside_.before_s);
-      refuse_line(LineFlaw::clock_set_back, aside_.line, words);
-    }
-  }
-
-  void refuse_line(LineFlaw flaw, std::uint64_t line, std::string_view words) {
-    const std::string text = fmt::format(
-        "{}, line {}: {}; write {{\"time\": s, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}}, "
-        "or CSV "
-        "with these columns",
-        lines_.name(), line, words);
-    if (is_file()) {
-      throw Error(Fault::input, text);
-    }
-    malformed_ += flaw < LineFlaw::out_of_order ? 1 : 0;  // the track counts the others
-    if (first_refused_.empty() &&
-        flaw != LineFlaw::clock_set_back) {  // those poses have joined the track
-      first_refused_ = text;
-    }
-    const auto kind = static_cast<std::size_t>(flaw);
-    if (warn_ && !told_[kind]) {
-      warn_("poses " + text);
-    }
-    told_[kind] = true;
-  }
-
-  PoseTrack& track_;
-  PosedSensor::Warn warn_;
-  FrameLines format_{0};
-  LineReader lines_;
-  bool ended_ = false;
-  std::uint64_t line_ = 0;       ///< the last line that was taken
-  std::uint64_t poses_ = 0;      ///< lines handed to the track
-  std::uint64_t malformed_ = 0;  ///< lines that hold no pose
-  std::string first_refused_;
-  std::bitset<static_cast<std::size_t>(LineFlaw::kinds)> told_;
-
-  /// The first of the poses that the track has set aside.
-  struct {
-    std::uint64_t line = 0;
-    double time_s = 0.0;
-    double before_s = 0.0;  ///< time of the track's last pose
-  } aside_;
-};
-
 using Clock = std::chrono::steady_clock;
+using Kind = FrameLines::Flaw::Kind;
 using namespace std::chrono_literals;
 
 // How long a frame waits for the pose after it.
@@ -189,13 +44,89 @@ struct PosedSensor::Impl {
     Clock::time_point since;
   };
 
-  Impl(std::unique_ptr<Sensor> inner, const std::string& name, double largest_gap_s, Warn warn)
-      : sensor(std::move(inner)), track(largest_gap_s), reader(name, track, std::move(warn)) {}
+  Impl(std::unique_ptr<Sensor> inner, const std::string& name, double largest_gap_s,
+       const Warn& warn)
+      : sensor(std::move(inner)),
+        track(largest_gap_s),
+        flaws(warn ? Warn([warn](const std::string& text) { warn("poses " + text); }) : warn),
+        lines("poses", name, longest_line,
+              [this](const LineReader::Line& line) { take_line(line); }) {
+    while (lines.is_file() && read_block()) {
+    }
+  }
+
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  // Reads the poses that have come, without waiting and at most 64 KiB, so that a flood does not
+  // block the caller.
+  void read_poses() {
+    for (int block = 0; block < blocks_at_once && read_block(); ++block) {
+    }
+  }
+
+  // Reads one block of poses; false where there is none, or none yet.
+  bool read_block() {
+    const bool some = lines.read_some();
+    if (lines.ended() && !std::exchange(poses_ended, true)) {
+      judging_order([this] { track.end(); });
+    }
+    return some;
+  }
+
+  void take_line(const LineReader::Line& line) {
+    const auto read = line.too_long ? FrameLines::Flaw{.words = "is longer than any pose"}
+                                    : format.read(line.text, 0.0);
+    if (const auto* flaw = std::get_if<FrameLines::Flaw>(&read)) {
+      ++malformed;
+      flaws.add(flaw->kind, words_about(line.number, flaw->words));
+    } else if (const auto* frame = std::get_if<Frame>(&read)) {
+      const double before_s = track.last_s().value_or(frame->host_time_s);
+      ++poses;
+      judging_order([&] { track.add(frame->host_time_s, *frame->T_robot_sensor); });
+      if (track.set_aside() == 1) {
+        aside = {.line = line.number, .time_s = frame->host_time_s, .before_s = before_s};
+      }
+    }
+  }
+
+  // Reports what the track does with the poses that it had set aside.
+  void judging_order(const auto& change_track) {
+    const std::uint64_t dropped = track.dropped();
+    const std::uint64_t set_back = track.set_back();
+    change_track();
+    const auto& [line, time_s, before_s] = aside;
+    if (track.dropped() != dropped) {
+      const char* when = time_s <= before_s ? "not later than" : "far later than";
+      flaws.add(Kind::out_of_order,
+                words_about(line, fmt::format("time = {} s is {} the poses around it, at {} s",
+                                              time_s, when, before_s)));
+    }
+    if (track.set_back() != set_back) {  // those poses have joined the track
+      flaws.say(Kind::clock_set_back,
+                words_about(line, fmt::format("time = {} s is not later than the pose before, at "
+                                              "{} s, and the poses after it go on from there: the "
+                                              "robot's clock was set",
+                                              time_s, before_s)));
+    }
+  }
+
+  // What is wrong with a line. Throws Error with these words where it stands in a file.
+  std::string words_about(std::uint64_t line, const std::string& words) const {
+    const std::string text = fmt::format(
+        "{}, line {}: {}; write {{\"time\": s, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}}, "
+        "or CSV with these columns",
+        lines.name(), line, words);
+    if (lines.is_file()) {
+      throw Error(Fault::input, text);
+    }
+    return text;
+  }
 
   // True where no pose that is still to come can change the frame's pose.
   bool decided(const Frame& frame) const {
     const auto last_s = track.last_s();
-    return reader.ended() || (last_s && *last_s >= frame.host_time_s);
+    return poses_ended || (last_s && *last_s >= frame.host_time_s);
   }
 
   // Returns the first frame once its pose is known or given up; none before.
@@ -206,7 +137,7 @@ struct PosedSensor::Impl {
     const Held& first = held.front();
     if (!decided(first.frame)) {
       forget_before(first.frame.host_time_s);
-      reader.read();
+      read_poses();
     }
     if (!decided(first.frame) && Clock::now() - first.since < patience) {
       return {};
@@ -230,7 +161,7 @@ struct PosedSensor::Impl {
       return true;
     }
     if (track.size() < most_poses) {
-      reader.read();
+      read_poses();
     }
     if (sensor->gone() && track.last_s()) {
       forget_before(*track.last_s() - kept_while_gone_s);
@@ -240,21 +171,32 @@ struct PosedSensor::Impl {
 
   // The poses of a file stay, for when the sensor starts again.
   void forget_before(double time_s) {
-    if (!reader.is_file()) {
+    if (!lines.is_file()) {
       track.forget_before(time_s);
     }
   }
 
   std::unique_ptr<Sensor> sensor;
   PoseTrack track;
-  PoseReader reader;
+  RefusedLines flaws;
+  FrameLines format{0};
+  std::uint64_t poses = 0;      // lines handed to the track
+  std::uint64_t malformed = 0;  // lines that hold no pose
+  bool poses_ended = false;     // no more will come
+  // The first of the poses that the track has set aside.
+  struct {
+    std::uint64_t line = 0;
+    double time_s = 0.0;
+    double before_s = 0.0;  // time of the track's last pose
+  } aside;
+  LineReader lines;
   std::deque<Held> held;
   Poses counts;
 };
 
 PosedSensor::PosedSensor(std::unique_ptr<Sensor> sensor, const std::string& poses,
                          double largest_gap_s, Warn warn)
-    : impl_(std::make_unique<Impl>(std::move(sensor), poses, largest_gap_s, std::move(warn))) {}
+    : impl_(std::make_unique<Impl>(std::move(sensor), poses, largest_gap_s, warn)) {}
 
 PosedSensor::~PosedSensor() = default;
 
@@ -291,10 +233,11 @@ SensorCounters PosedSensor::counters() const { return impl_->sensor->counters();
 
 PosedSensor::Poses PosedSensor::poses() const {
   Poses counts = impl_->counts;
-  counts.read = impl_->reader.poses();
-  counts.refused = impl_->reader.refused();
-  counts.set_back = impl_->track.set_back();
-  counts.first_refused = impl_->reader.first_refused();
+  const PoseTrack& track = impl_->track;
+  counts.read = impl_->poses - track.dropped() - track.set_aside();
+  counts.refused = impl_->malformed + track.dropped();
+  counts.set_back = track.set_back();
+  counts.first_refused = impl_->flaws.first();
   return counts;
 }
 

@@ -174,30 +174,26 @@ std::vector<double> offsets_for(std::span<const double> time_s, const PoseLog& p
   return offsets_s;
 }
 
-/// How far the nearest other valley below `limit` lies from that of the offsets low to high; none
-/// without another.
-std::optional<double> next_rival_s(const std::vector<double>& offsets_s,
-                                   const std::vector<double>& against, double limit,
-                                   std::size_t low, std::size_t high) {
-  const double middle_s = 0.5 * (offsets_s[low] + offsets_s[high]);
-  for (; low > 0 && against[low - 1] <= limit; --low) {
-  }
-  for (; high + 1 < against.size() && against[high + 1] <= limit; ++high) {
-  }
-  std::optional<double> nearest_s;
+/// Offsets next to each other, from the first to the last.
+struct Valley {
+  std::size_t low;
+  std::size_t high;
+};
+
+/// The valleys in which `against` is at most `limit`.
+std::vector<Valley> valleys_below(double limit, const std::vector<double>& against) {
+  std::vector<Valley> valleys;
   for (std::size_t k = 0; k < against.size(); ++k) {
-    if ((k >= low && k <= high) || against[k] > limit) {
+    if (against[k] > limit) {
       continue;
     }
-    std::size_t end = k;  // of this valley
-    while (end + 1 < against.size() && end + 1 != low && against[end + 1] <= limit) {
-      ++end;
+    if (!valleys.empty() && valleys.back().high + 1 == k) {
+      valleys.back().high = k;
+    } else {
+      valleys.push_back({k, k});
     }
-    const double away_s = std::abs(0.5 * (offsets_s[k] + offsets_s[end]) - middle_s);
-    nearest_s = std::min(nearest_s.value_or(away_s), away_s);
-    k = end;
   }
-  return nearest_s;
+  return valleys;
 }
 
 }  // namespace
@@ -219,43 +215,37 @@ std::optional<ClockOffset> clock_offset(std::span<const double> time_s, std::spa
   for (std::size_t k = 0; k < offsets_s.size(); ++k) {
     against.push_back(comparison.sum_against(k));
   }
-  const auto nearest_to = [&](double origin_s, std::size_t a, std::size_t b) {
-    return std::abs(offsets_s[a] - origin_s) < std::abs(offsets_s[b] - origin_s) ? a : b;
-  };
-  std::size_t none = 0;  // the offset 0
-  for (std::size_t k = 0; k < offsets_s.size(); ++k) {
-    none = nearest_to(0.0, k, none);
+  const auto none = static_cast<std::size_t>(
+      std::ranges::min_element(offsets_s, {}, [](double s) { return std::abs(s); }) -
+      offsets_s.begin());
+  const auto count = static_cast<double>(presses.size());
+  const double least = *std::ranges::min_element(against);
+  if (least > 0.25 * count || against[none] - least < std::max(3.0, 0.3 * count)) {
+    return {};
   }
   // Of clocks with one epoch the smallest offset is the likeliest; of others 0 means nothing.
   const bool overlap =
       poses.time_s.front() <= time_s.back() && time_s.front() <= poses.time_s.back();
   const double origin_s = overlap ? 0.0 : poses.time_s.front() - time_s.front();
-  const auto count = static_cast<double>(presses.size());
-  const double least = *std::ranges::min_element(against);
-  const double as_good = least + std::max(0.5, 0.03 * count);
-  const double gain = against[none] - least;
-  if (least > 0.25 * count || gain < std::max(3.0, 0.3 * count)) {
-    return {};
-  }
-  std::size_t best = against.size();
-  for (std::size_t k = 0; k < against.size(); ++k) {
-    if (against[k] <= as_good) {
-      best = best == against.size() ? k : nearest_to(origin_s, k, best);
-    }
-  }
-  std::size_t low = best;
-  std::size_t high = best;
-  for (; low > 0 && against[low - 1] <= as_good; --low) {
-  }
-  for (; high + 1 < against.size() && against[high + 1] <= as_good; ++high) {
-  }
-  ClockOffset offset{.seconds = 0.5 * (offsets_s[low] + offsets_s[high]),
+  const auto from_origin_s = [&](const Valley& valley) {
+    return std::abs(std::clamp(origin_s, offsets_s[valley.low], offsets_s[valley.high]) - origin_s);
+  };
+  const auto middle_s = [&](const Valley& valley) {
+    return 0.5 * (offsets_s[valley.low] + offsets_s[valley.high]);
+  };
+  const auto as_good = valleys_below(least + std::max(0.5, 0.03 * count), against);
+  const Valley best = *std::ranges::min_element(as_good, {}, from_origin_s);
+  ClockOffset offset{.seconds = middle_s(best),
                      .presses = presses.size(),
                      .against = comparison.count_against(none),
-                     .left = comparison.count_against((low + high) / 2)};
+                     .left = comparison.count_against((best.low + best.high) / 2)};
   if (!overlap) {
-    const double clearly_worse = least + std::max(2.0, 0.15 * count);
-    offset.open_s = next_rival_s(offsets_s, against, clearly_worse, low, high);
+    for (const Valley& rival : valleys_below(least + std::max(2.0, 0.15 * count), against)) {
+      const double away_s = std::abs(middle_s(rival) - offset.seconds);
+      if (rival.high < best.low || rival.low > best.high) {
+        offset.open_s = std::min(offset.open_s.value_or(away_s), away_s);
+      }
+    }
   }
   return offset;
 }

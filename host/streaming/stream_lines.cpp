@@ -16,7 +16,7 @@
 #include "io/csv_cells.hpp"
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 #include "palpate/pose_track.hpp"
 
 namespace palpate {
@@ -44,17 +44,9 @@ bool add_readings(const nlohmann::json& list, std::vector<double>& values, bool 
 
 /// The line with null in the place of the NaN that Python writes, which JSON does not know.
 std::string without_nan(std::string_view line) {
-  constexpr std::string_view nan = "NaN";
-  std::string text;
-  bool quoted = false;
-  for (std::size_t at = 0; at < line.size(); ++at) {
-    quoted = quoted != (line[at] == '"' && (at == 0 || line[at - 1] != '\\'));
-    if (!quoted && line.substr(at, nan.size()) == nan) {
-      text += "null";
-      at += nan.size() - 1;
-    } else {
-      text += line[at];
-    }
+  std::string text(line);
+  for (std::size_t at = text.find("NaN"); at != text.npos; at = text.find("NaN", at)) {
+    text.replace(at, 3, "null");
   }
   return text;
 }
@@ -78,12 +70,11 @@ LineReader::LineReader(std::string kind, const std::string& name, std::size_t lo
   descriptor_ = name == "-" ? STDIN_FILENO : file_.get();
   struct stat status {};
   if (descriptor_ < 0 || ::fstat(descriptor_, &status) != 0) {
-    throw Error(Fault::input, fmt::format("{} {}: cannot be read: {}; give a file, a FIFO or - for "
-                                          "standard input",
-                                          kind_, name, std::strerror(errno)));
+    refuse(kind_ + " " + name, "cannot be read: {}; give a file, a FIFO or - for standard input",
+           std::strerror(errno));
   }
   if (S_ISDIR(status.st_mode)) {
-    throw Error(Fault::input, fmt::format("{} {}: is a folder; name a file in it", kind_, name));
+    refuse(kind_ + " " + name, "is a folder; name a file in it");
   }
   is_file_ = S_ISREG(status.st_mode);
   is_fifo_ = S_ISFIFO(status.st_mode) && descriptor_ != STDIN_FILENO;
@@ -101,8 +92,8 @@ bool LineReader::read_some(std::chrono::milliseconds wait) {
     return true;
   }
   if (got < 0 && is_file_) {
-    throw Error(Fault::input, fmt::format("{} {}: cannot be read: {}; copy or record it again",
-                                          kind_, name_, std::strerror(errno)));
+    refuse(kind_ + " " + name_, "cannot be read: {}; copy or record it again",
+           std::strerror(errno));
   }
   if (got == 0 && !is_fifo_) {
     ended_ = true;

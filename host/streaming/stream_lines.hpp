@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -78,9 +80,10 @@ class LineReader {
 /// separate the cells where a line has three or more.
 class FrameLines {
  public:
-  /// Why a line is refused.
+  /// Why a line is refused. Frames are in any order; of poses, the track judges it.
   struct Flaw {
-    enum class Kind { malformed, no_number, far_away } kind = Kind::malformed;
+    enum class Kind { malformed, no_number, far_away, out_of_order, clock_set_back };
+    Kind kind = Kind::malformed;
     std::string words;
   };
   struct Header {};
@@ -118,6 +121,32 @@ class FrameLines {
   bool is_first_ = true;              ///< no line was read: only the first may be a header of poses
   std::vector<std::size_t> columns_;  ///< of CSV; empty before its first row or header
   char separator_ = ',';              ///< between them
+};
+
+/// The lines of a stream that are refused: the first one is kept, the first of each kind said.
+class RefusedLines {
+ public:
+  /// @param warn may be empty
+  explicit RefusedLines(std::function<void(const std::string&)> warn) : warn_(std::move(warn)) {}
+
+  void add(FrameLines::Flaw::Kind kind, const std::string& text) {
+    first_ = first_.empty() ? text : first_;
+    say(kind, text);
+  }
+  /// Says the first of a kind, without refusing it.
+  void say(FrameLines::Flaw::Kind kind, const std::string& text) {
+    const auto index = static_cast<std::size_t>(kind);
+    if (warn_ && !told_[index]) {
+      warn_(text);
+    }
+    told_.set(index);
+  }
+  const std::string& first() const { return first_; }
+
+ private:
+  std::function<void(const std::string&)> warn_;
+  std::string first_;
+  std::bitset<5> told_;  ///< kinds
 };
 
 }  // namespace palpate

@@ -10,9 +10,7 @@
 
 #include "io/recording_rules.hpp"
 #include "model/number_text.hpp"
-#include "streaming/import_array.hpp"
-#include "streaming/pose_join.hpp"
-#include "streaming/touch_plane.hpp"
+#include "streaming/import_steps.hpp"
 
 namespace palpate {
 
@@ -67,8 +65,8 @@ void choose_rows(const ImportOptions& options, std::size_t n, Recording& recordi
   recording.rows = options.rows;
 }
 
-/// The label and the pose of `truth`, whose numbers are still in the units of the tables.
-Truth truth_of(const std::string& text) {
+/// The label and the pose of `truth`, whose numbers are in these units of x, y and theta.
+Truth truth_of(const std::string& text, const std::array<Unit, 3>& units) {
   std::string label = text;  // which may hold commas itself
   std::array<double, 3> pose{};
   for (std::size_t i = pose.size(); i-- > 0;) {
@@ -78,48 +76,39 @@ Truth truth_of(const std::string& text) {
     if (!number) {
       refuse(fmt::format("`truth {}`", text), "give LABEL,X,Y,THETA, in the units of the poses");
     }
-    pose[i] = *number;
+    pose[i] = units[i].convert(*number);
     label.resize(comma);
   }
-  return {label, {{pose[0], pose[1]}, pose[2]}};
-}
-
-/// The pose of `truth` in mm and rad.
-Pose truth_pose(const std::string& text, const Pose& in_units, const std::array<Unit, 3>& units) {
-  const Pose pose{
-      {units[0].convert(in_units.translation_mm.x), units[1].convert(in_units.translation_mm.y)},
-      units[2].convert(in_units.theta_rad)};
-  if (!is_robot_pose(pose)) {
+  const Pose T_object_robot{{pose[0], pose[1]}, pose[2]};
+  if (!is_robot_pose(T_object_robot)) {
     refuse(fmt::format("`truth {}`", text),
            "is further than {:g} mm or turned by more than 1e9 rad; check the numbers and "
            "their units, {}, {} and {}",
            farthest_mm, units[0].name, units[1].name, units[2].name);
   }
-  return pose;
+  return {label, T_object_robot};
 }
 
 void check_numbers(const ImportOptions& options) {
-  if (options.largest_gap_s &&
-      !(*options.largest_gap_s > 0.0 && std::isfinite(*options.largest_gap_s))) {
-    refuse(fmt::format("`largest-gap-s {}`", *options.largest_gap_s), "give seconds above 0");
-  }
-  constexpr double slowest_hz = 1e-3;
-  constexpr double fastest_hz = 1e6;
-  if (options.rate_hz && !(*options.rate_hz >= slowest_hz && *options.rate_hz <= fastest_hz)) {
-    refuse(fmt::format("`rate {}`", *options.rate_hz), "give {} to {} Hz", slowest_hz, fastest_hz);
-  }
-  if (options.sign != 1 && options.sign != -1) {
-    refuse(fmt::format("`sign {}`", options.sign), "give 1, or -1 where readings fall under load");
-  }
-  if (!std::isfinite(options.pose_delay_s)) {
-    refuse(fmt::format("`pose-delay {}`", options.pose_delay_s), "give seconds");
-  }
-  if (!options.mount.empty() && options.poses.empty()) {
-    refuse(fmt::format("`mount {}`", options.mount), "is for poses; give `poses`");
-  }
-  if (options.unposed && !options.poses.empty()) {
-    refuse("`unposed`", "{} holds the poses; leave one of them out", options.poses);
-  }
+  const auto require = [](bool holds, const std::string& option, const std::string& remedy) {
+    if (!holds) {
+      refuse(fmt::format("`{}`", option), "{}", remedy);
+    }
+  };
+  const double gap_s = options.largest_gap_s.value_or(1.0);
+  require(gap_s > 0.0 && std::isfinite(gap_s), fmt::format("largest-gap-s {}", gap_s),
+          "give seconds above 0");
+  const double rate_hz = options.rate_hz.value_or(1.0);
+  require(rate_hz >= 1e-3 && rate_hz <= 1e6, fmt::format("rate {}", rate_hz),
+          "give 0.001 to 1000000 Hz");
+  require(options.sign == 1 || options.sign == -1, fmt::format("sign {}", options.sign),
+          "give 1, or -1 where readings fall under load");
+  require(std::isfinite(options.pose_delay_s), fmt::format("pose-delay {}", options.pose_delay_s),
+          "give seconds");
+  require(options.mount.empty() || !options.poses.empty(), "mount " + options.mount,
+          "is for poses; give `poses`");
+  require(!options.unposed || options.poses.empty(), "unposed",
+          options.poses + " holds the poses; leave one of them out");
 }
 
 /// The pose of `mount`; none where it is not given.
@@ -163,23 +152,24 @@ void mount_array(const SpatialPose& mount, PoseTable& poses) {
 }
 
 /// The recording of rows that are read.
-ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, ImportRows rows) {
+ImportedRecording recording_of(const ImportOptions& options, Recording array, ImportRows rows) {
   const std::optional<glm::dvec3> normal = plane_normal(options.plane);
   const std::optional<SpatialPose> mount = mount_of(options.mount);
   auto& [pressures, poses, T_robot_object, elements] = rows;
   ImportedRecording imported;
-  for (const std::string& words : pressures.understood) {
-    imported.understood.push_back(fmt::format("{}: {}", options.pressures, words));
-  }
+  const auto say = [&](const std::string& file, const std::vector<std::string>& words) {
+    for (const std::string& sentence : words) {
+      imported.understood.push_back(fmt::format("{}: {}", file, sentence));
+    }
+  };
+  say(options.pressures, pressures.understood);
   const std::vector<std::string> stretches = lay_out_stretches(options, pressures, poses);
   imported.understood.insert(imported.understood.end(), stretches.begin(), stretches.end());
   imported.holds_poses = pressures.holds_poses;
   Recording& recording = imported.recording;
+  recording = std::move(array);
   recording.pressure_unit = options.pressure_unit;
   recording.object = options.object;
-  recording.elements_mm = std::move(array.elements_mm);
-  recording.valid = std::move(array.valid);
-  recording.baseline = std::move(array.baseline);
   recording.pressure = std::move(pressures.pressure);
   if (options.sign < 0) {
     std::ranges::transform(recording.baseline, recording.baseline.begin(), std::negate<>{});
@@ -193,11 +183,6 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
   choose_rows(options, survey.rows(), recording);
   mark_unknown(options.pressures, survey, recording);
   if (poses) {
-    const auto say = [&](const std::vector<std::string>& words) {
-      for (const std::string& sentence : words) {
-        imported.understood.push_back(fmt::format("{}: {}", options.poses, sentence));
-      }
-    };
     if (mount) {
       mount_array(*mount, *poses);
     }
@@ -209,13 +194,9 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
       time_s -= options.pose_delay_s;  // to the clock of the frames
     }
     if (!poses->spatial.empty()) {
-      const TouchPlane plane = touch_plane(poses->spatial, normal);
-      say(take_into_plane(plane, survey, *poses, recording));
-      if (T_robot_object) {
-        recording.truth = Truth{options.object, inverse(plane.project(*T_robot_object))};
-      }
+      say(options.poses, take_into_plane(normal, T_robot_object, survey, *poses, recording));
     }
-    say(poses->understood);
+    say(options.poses, poses->understood);
     imported.assumed_units = poses->assumed_units;
     join(std::move(*poses), survey, options, imported);
   } else {
@@ -233,8 +214,7 @@ ImportedRecording recording_of(const ImportOptions& options, ArrayTable array, I
 ImportedRecording import_tables(const ImportOptions& options) {
   validate(options);
   check_numbers(options);
-  auto truth = options.truth.empty() ? std::nullopt : std::optional(truth_of(options.truth));
-  ArrayTable array = import_array(options);
+  Recording array = import_array(options);
   const auto require_column = [&](const std::string& option, const std::string& name) {
     if (!has_column(options.pressures, name) && !has_column(options.poses, name)) {
       refuse(fmt::format("`{}`", option), "no table has this column; give its name");
@@ -274,9 +254,8 @@ ImportedRecording import_tables(const ImportOptions& options) {
     pose_units = rows.poses->units;
   }
   ImportedRecording imported = recording_of(options, std::move(array), std::move(rows));
-  if (truth) {
-    truth->T_object_robot = truth_pose(options.truth, truth->T_object_robot, pose_units);
-    imported.recording.truth = truth;
+  if (!options.truth.empty()) {
+    imported.recording.truth = truth_of(options.truth, pose_units);
   }
   return imported;
 }
@@ -288,7 +267,7 @@ void require_sound(const ImportOptions& options) {
 
 ImportedRecording import_rows(const ImportOptions& options, ImportRows rows) {
   check_numbers(options);
-  ArrayTable array = import_array(options);
+  Recording array = import_array(options);
   if (array.elements_mm.size() != rows.elements) {
     refuse(options.pressures,
            "has {} readings a frame for an array of {} elements; correct `array`", rows.elements,

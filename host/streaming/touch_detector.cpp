@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 
 #include "model/own_process.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 #include "palpate/pose_track.hpp"
 #include "streaming/frame_smoother.hpp"
 #include "streaming/press_touches.hpp"
@@ -27,10 +27,9 @@ class SteadyPhase {
  public:
   explicit SteadyPhase(const TouchDetectorOptions& options) : options_(options) {}
 
-  bool empty() const { return frames_ == 0; }
   /// True where a frame of this load and pose continues the phase.
   bool fits(double load, const std::optional<Pose>& T_robot_sensor) const {
-    if (empty()) {
+    if (frames_ == 0) {
       return true;
     }
     const double mean = load_sum_ / static_cast<double>(frames_);
@@ -77,14 +76,7 @@ class SteadyPhase {
   }
 
   /// Forgets all frames.
-  void clear() {
-    frames_ = 0;
-    load_sum_ = 0.0;
-    first_pose_.reset();
-    stride_ = 1;
-    kept_.clear();
-    pressure_.clear();
-  }
+  void clear() { *this = SteadyPhase(options_); }
 
  private:
   // Counts the frames kept before the release, which shows late in the smoothed pressures.
@@ -124,8 +116,7 @@ class SteadyPhase {
 
 void require(const char* field, double value, bool in_range, const char* range) {
   if (!std::isfinite(value) || !in_range) {
-    throw Error(Fault::input,
-                fmt::format("touch detector {} = {}: make it {}", field, value, range));
+    refuse(fmt::format("touch detector {} = {}", field, value), "make it {}", range);
   }
 }
 
@@ -211,9 +202,9 @@ struct TouchDetector::Impl {
     }
     const std::vector<double>& baseline = rest.rest();
     if (e != baseline.size() || (!valid.empty() && valid.size() != e)) {
-      throw Error(Fault::input, fmt::format("a frame has {} values where {} are expected; feed the "
-                                            "touch detector the frames of one array",
-                                            e, baseline.size()));
+      refuse("touch detector",
+             "a frame has {} values where {} are expected; give it the frames of one array", e,
+             baseline.size());
     }
     pressure.resize(e);
     bool any_known = false;
@@ -258,9 +249,8 @@ TouchDetector::TouchDetector(const TouchDetectorOptions& options, std::vector<do
                              std::vector<std::uint8_t> valid) {
   validate(options);
   if (!baseline.empty() && !valid.empty() && baseline.size() != valid.size()) {
-    throw Error(Fault::input,
-                fmt::format("touch detector: {} baseline and {} valid values; make them agree",
-                            baseline.size(), valid.size()));
+    refuse("touch detector", "{} baseline and {} valid values; make them agree", baseline.size(),
+           valid.size());
   }
   for (std::size_t i = 0; i < baseline.size(); ++i) {
     if (!valid.empty() && valid[i] == 0) {

@@ -1,4 +1,4 @@
-#include "streaming/touch_plane.hpp"
+#include "streaming/import_steps.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -20,10 +20,6 @@ constexpr double degrees = 180.0 / std::numbers::pi;
 constexpr double much_tilt_rad = 3.0 / degrees;
 constexpr double much_height_mm = 2.0;
 
-glm::dvec3 axis(const SpatialPose& pose, const glm::dvec3& of_sensor) {
-  return pose.rotation * of_sensor;
-}
-
 double angle_between(const glm::dvec3& a, const glm::dvec3& b) {
   return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
 }
@@ -34,7 +30,7 @@ glm::dvec3 mean_z(const std::vector<std::optional<SpatialPose>>& poses) {
   double count = 0.0;
   for (const auto& pose : poses) {
     if (pose) {
-      sum += axis(*pose, {0.0, 0.0, 1.0});
+      sum += pose->rotation * glm::dvec3(0.0, 0.0, 1.0);
       ++count;
     }
   }
@@ -46,9 +42,10 @@ glm::dvec3 normal_across(const glm::dvec3& looks) {
   constexpr double least = 0.7;  // of the mean's length: directions within some 45 degrees
   constexpr double steep = 0.5;  // of the normal's part along the robot's z
   if (glm::length(looks) < least) {
-    throw Error(Fault::input,
-                "`plane`: missing; the sensor's z axis points in unlike directions, so that the "
-                "poses do not tell the plane of the touches: give its normal, such as 0,0,1");
+    refuse(
+        "`plane`",
+        "missing; the sensor's z axis points in unlike directions, so that the poses do not tell "
+        "the plane of the touches: give its normal, such as 0,0,1");
   }
   const glm::dvec3 n = glm::normalize(looks);
   const double side = std::abs(n.z) > steep ? n.z : std::abs(n.x) >= std::abs(n.y) ? n.x : n.y;
@@ -78,21 +75,26 @@ std::vector<bool> pressed_poses(const PoseTable& poses, const Recording& recordi
   return pressed;
 }
 
-}  // namespace
+/// The plane in which an array touches.
+struct TouchPlane {
+  glm::dvec3 normal;  ///< of the robot frame, of length 1
+  /// The array looks against the normal, as under a tool that points down: seen from the normal's
+  /// side its y axis is mirrored.
+  bool faces_down = false;
+  glm::dvec3 x{};  ///< axes in the plane, as the robot's x and y where it is its own
+  glm::dvec3 y{};
 
-Pose TouchPlane::project(const SpatialPose& pose) const {
-  const glm::dvec3 along = axis(pose, {1.0, 0.0, 0.0});
-  return {{glm::dot(x, pose.translation_mm), glm::dot(y, pose.translation_mm)},
-          std::atan2(glm::dot(y, along), glm::dot(x, along))};
-}
-
-double TouchPlane::height_mm(const SpatialPose& pose) const {
-  return glm::dot(normal, pose.translation_mm);
-}
-
-double TouchPlane::tilt_rad(const SpatialPose& pose) const {
-  return angle_between(axis(pose, {0.0, 0.0, 1.0}), faces_down ? -normal : normal);
-}
+  /// T_robot_sensor in the plane, of an array whose y axis is turned over where it faces down.
+  Pose project(const SpatialPose& pose) const {
+    const glm::dvec3 along = pose.rotation * glm::dvec3(1.0, 0.0, 0.0);
+    return {{glm::dot(x, pose.translation_mm), glm::dot(y, pose.translation_mm)},
+            std::atan2(glm::dot(y, along), glm::dot(x, along))};
+  }
+  double height_mm(const SpatialPose& pose) const { return glm::dot(normal, pose.translation_mm); }
+  double tilt_rad(const SpatialPose& pose) const {
+    return angle_between(pose.rotation * glm::dvec3(0.0, 0.0, 1.0), faces_down ? -normal : normal);
+  }
+};
 
 TouchPlane touch_plane(const std::vector<std::optional<SpatialPose>>& poses,
                        const std::optional<glm::dvec3>& normal) {
@@ -106,8 +108,6 @@ TouchPlane touch_plane(const std::vector<std::optional<SpatialPose>>& poses,
   plane.y = glm::cross(n, plane.x);
   return plane;
 }
-
-namespace {
 
 /// What to say of the plane, in sentences.
 std::vector<std::string> words_about(const TouchPlane& plane) {
@@ -187,8 +187,14 @@ std::optional<glm::dvec3> plane_normal(const std::string& plane) {
   return normal;
 }
 
-std::vector<std::string> take_into_plane(const TouchPlane& plane, const ImportSurvey& survey,
-                                         PoseTable& poses, Recording& recording) {
+std::vector<std::string> take_into_plane(const std::optional<glm::dvec3>& normal,
+                                         const std::optional<SpatialPose>& T_robot_object,
+                                         const ImportSurvey& survey, PoseTable& poses,
+                                         Recording& recording) {
+  const TouchPlane plane = touch_plane(poses.spatial, normal);
+  if (T_robot_object) {
+    recording.truth = Truth{recording.object, inverse(plane.project(*T_robot_object))};
+  }
   recording.findings = tilt_of(plane, poses.spatial, pressed_poses(poses, recording, survey));
   poses.T_robot_sensor.reserve(poses.spatial.size());
   poses.height_mm.reserve(poses.spatial.size());

@@ -6,7 +6,6 @@
 #include <limits>
 #include <map>
 #include <numbers>
-#include <span>
 #include <utility>
 #include <vector>
 
@@ -14,8 +13,8 @@
 #include <fmt/ranges.h>
 
 #include "model/number_text.hpp"
+#include "model/refuse.hpp"
 #include "model/stream_time.hpp"
-#include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/touch.hpp"
@@ -32,22 +31,19 @@ class ReplayedSensor : public Sensor {
   /// @throws Error where the file is no recording of frames with times
   ReplayedSensor(const std::string& path, std::optional<double> speed)
       : recording_(read_recording(path)), pace_(speed) {
-    const auto refuse = [&](const char* message) {
-      throw Error(Fault::input, fmt::format("{}: {}", path, message));
-    };
     const Recording& r = recording_;
     if (r.rows != "frames") {
-      refuse(
-          "attribute 'rows' = 'touches' means single readings; give a stream of frames, or "
-          "recognise "
-          "the touches: palpate recognize");
+      refuse(path,
+             "attribute 'rows' = 'touches' means single readings; give a stream of frames, or "
+             "recognise the touches: palpate recognize");
     }
     if (r.time_s.empty()) {
-      refuse("dataset 'time' is missing; a replay needs the times of the frames");
+      refuse(path, "dataset 'time' is missing; a replay needs the times of the frames");
     }
     const std::size_t e = r.elements();
     if (r.elements_mm.size() != e) {
-      refuse("dataset 'elements' changes from frame to frame; record each array to its own file");
+      refuse(path,
+             "dataset 'elements' changes from frame to frame; record each array to its own file");
     }
     description_ = {.name = r.sensor,
                     .serial = r.serial,
@@ -122,32 +118,26 @@ class ReplayedSensor : public Sensor {
 
 constexpr std::string_view replay = "replay:";
 constexpr std::string_view simulate = "simulate:";
-constexpr std::array<std::string_view, 1> replay_keys{"speed"};
-constexpr std::array<std::string_view, 7> simulate_keys{"rate",  "array",  "seed", "touches",
-                                                        "noise", "object", "speed"};
 
-// Parses "WHAT,key=value,key=value" and each key's value.
+/// What a name such as "simulate:A,rate=1000,object=1:2:30" says.
 class SourceName {
  public:
-  // A path may hold commas and equals signs, so that only a known key ends it.
   explicit SourceName(const std::string& name) : name_(name) {
     const bool replays = name.starts_with(replay);
-    const std::string_view scheme = replays ? replay : simulate;
-    const std::span<const std::string_view> keys =
-        replays ? std::span<const std::string_view>(replay_keys) : simulate_keys;
-    std::string_view rest = std::string_view(name_).substr(scheme.size());
-    for (;;) {
-      const std::size_t comma = rest.rfind(',');
-      if (comma == std::string_view::npos) {
+    const auto keys = replays ? std::vector<std::string>{"speed"}
+                              : std::vector<std::string>{"rate",  "array",  "seed", "touches",
+                                                         "noise", "object", "speed"};
+    what_ = name.substr(replays ? replay.size() : simulate.size());
+    // A path may hold commas and equals signs, so that only a known key ends it.
+    for (auto comma = what_.rfind(','); comma != what_.npos; comma = what_.rfind(',')) {
+      const std::string option = what_.substr(comma + 1);
+      const std::string key = option.substr(0, option.find('='));
+      const bool is_known = std::ranges::find(keys, key) != keys.end();
+      if (!is_known && replays) {
         break;
       }
-      const std::string_view option = rest.substr(comma + 1);
-      const std::string_view key = option.substr(0, option.find('='));
-      if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-        if (!replays) {
-          refuse(key, fmt::format("is no option; the options are {}", fmt::join(keys, ", ")));
-        }
-        break;
+      if (!is_known) {
+        refuse(key, fmt::format("is no option; the options are {}", fmt::join(keys, ", ")));
       }
       if (key.size() == option.size()) {
         refuse(key, "has no value; write key=value");
@@ -155,63 +145,59 @@ class SourceName {
       if (!options_.emplace(key, option.substr(key.size() + 1)).second) {
         refuse(key, "is given twice; leave one out");
       }
-      rest = rest.substr(0, comma);
+      what_.resize(comma);
     }
-    if (rest.empty()) {
-      refuse(scheme, "names nothing; write replay:FILE or simulate:SHAPE");
+    if (what_.empty()) {
+      refuse(name.substr(0, name.find(':') + 1),
+             "names nothing; write replay:FILE or simulate:SHAPE");
     }
-    what_ = rest;
   }
 
+  /// The file or the shape.
   const std::string& what() const { return what_; }
 
   template <typename Number>
-  std::optional<Number> number(std::string_view key, Number least, Number upper_bound) const {
-    const auto text = option(key);
-    return text ? std::optional(parse<Number>(key, *text, least, upper_bound)) : std::nullopt;
+  std::optional<Number> number(const char* key, Number least, Number upper_bound) const {
+    const auto found = options_.find(key);
+    return found == options_.end() ? std::nullopt
+                                   : std::optional(parse(key, found->second, least, upper_bound));
   }
 
   std::optional<double> speed() const {
-    const std::string_view text = option("speed").value_or("1");
-    return text == "max" ? std::nullopt : std::optional(parse("speed", text, 1e-3, 1e6));
+    const auto found = options_.find("speed");
+    const bool is_max = found != options_.end() && found->second == "max";
+    return is_max ? std::nullopt : std::optional(number("speed", 1e-3, 1e6).value_or(1.0));
   }
 
   std::optional<Pose> object_pose(std::uint64_t seed) const {
-    const auto text = option("object");
-    if (!text || *text == "random") {
-      return text ? std::optional(random_object_pose(seed)) : std::nullopt;
+    if (const auto found = options_.find("object");
+        found == options_.end() || found->second == "random") {
+      return found == options_.end() ? std::nullopt : std::optional(random_object_pose(seed));
     }
-    const auto [x, y, deg] = three("object", *text, "must be random, or X:Y:DEG in mm and degrees");
+    const auto [x, y, deg] = three("object", "must be random, or X:Y:DEG in mm and degrees");
     constexpr double far = 1e6;  // in mm and in degrees
     return Pose{{parse("object", x, -far, far), parse("object", y, -far, far)},
                 parse("object", deg, -far, far) * std::numbers::pi / 180.0};
   }
 
   std::vector<glm::dvec2> array() const {
-    const auto text = option("array");
-    if (!text) {
+    if (!options_.contains("array")) {
       return {};
     }
-    const auto parts = three("array", *text, "must be COLUMNS:ROWS:PITCH, the pitch in mm");
-    const int columns = parse("array", parts[0], 1, 64);
-    const int rows = parse("array", parts[1], 1, 64);
-    return grid_array(columns, rows, parse("array", parts[2], 0.01, 100.0));
+    const auto [columns, rows, pitch_mm] =
+        three("array", "must be COLUMNS:ROWS:PITCH, the pitch in mm");
+    return grid_array(parse("array", columns, 1, 64), parse("array", rows, 1, 64),
+                      parse("array", pitch_mm, 0.01, 100.0));
   }
 
  private:
   [[noreturn]] void refuse(std::string_view key, std::string_view message) const {
-    throw Error(Fault::input, fmt::format("sensor {}: {} {}", name_, key, message));
-  }
-
-  std::optional<std::string_view> option(std::string_view key) const {
-    const auto found = options_.find(key);
-    return found == options_.end() ? std::nullopt : std::optional(found->second);
+    palpate::refuse("sensor " + name_, "{} {}", key, message);
   }
 
   /// The parts of A:B:C.
-  std::array<std::string_view, 3> three(std::string_view key, std::string_view text,
-                                        std::string_view remedy) const {
-    const std::vector<std::string_view> parts = split_text(text, ':');
+  std::array<std::string_view, 3> three(const char* key, std::string_view remedy) const {
+    const std::vector<std::string_view> parts = split_text(options_.at(key), ':');
     if (parts.size() != 3) {
       refuse(key, remedy);
     }
@@ -230,7 +216,7 @@ class SourceName {
 
   std::string name_;
   std::string what_;
-  std::map<std::string_view, std::string_view> options_;
+  std::map<std::string, std::string> options_;
 };
 
 SimulatedSensorOptions options_of(const SourceName& source) {
@@ -264,27 +250,17 @@ bool is_endless_flood(const std::string& name) {
     return false;
   }
   const SimulatedSensorOptions options = options_of(SourceName(name));
-  // 6 GB in ten minutes: such a recording, if forgotten, still fits on most disks. The DigiTacts
-  // array gives 1.8 MB/s at 100 Hz and 100 times real time.
-  constexpr double most_bytes_per_s = 10e6;
-  const std::size_t elements =
-      options.elements_mm.empty() ? digitacts_array().size() : options.elements_mm.size();
-  // A recording stores readings as floats, and time, losses and a pose of three numbers in 8 bytes
-  // each.
-  const auto frame_bytes = static_cast<double>(elements * sizeof(float) + 5 * sizeof(double));
-  return !options.touches &&
-         (!options.speed || options.rate_hz * *options.speed * frame_bytes > most_bytes_per_s);
+  return !options.touches && !options.speed;
 }
 
 std::unique_ptr<Sensor> open_virtual_sensor(const std::string& name) {
-  if (name.starts_with(replay)) {
-    const SourceName source(name);
-    return std::make_unique<ReplayedSensor>(source.what(), source.speed());
-  }
-  if (!name.starts_with(simulate)) {
-    throw Error(Fault::input, fmt::format("sensor {}: write replay:FILE or simulate:SHAPE", name));
+  if (!is_virtual_sensor(name)) {
+    refuse("sensor " + name, "write replay:FILE or simulate:SHAPE");
   }
   const SourceName source(name);
+  if (name.starts_with(replay)) {
+    return std::make_unique<ReplayedSensor>(source.what(), source.speed());
+  }
   return make_simulated_sensor(source.what(), options_of(source));
 }
 

@@ -94,15 +94,6 @@ TEST_F(EvaluateCommand, ReadsLinesFoldersAndSingleRecords) {
   }
 }
 
-TEST_F(EvaluateCommand, TakesTheFitWhereNothingSaysNone) {
-  json records = four();
-  for (json& each : records) {
-    each.erase("none");
-    each["fit"] = {{"z", each["best"] == "(none)" ? -5.0 : 0.0}, {"verdict", "fits"}};
-  }
-  EXPECT_EQ(evaluation_of(records)["unknown_classes"]["area_under_curve"]["score"], "fit.z");
-}
-
 const json sound = json::parse(
     R"({"recording": "u.h5", "best": "A", "identity": {"A": 0.75, "B": 0.25}, "truth": {"object": "A"}})");
 
@@ -119,7 +110,7 @@ TEST(ResultsThatCannotBeJudged, AreRefusedByFileRecordAndField) {
   const std::pair<const char*, const char*> cases[] = {
       {R"(3)", "no JSON object but number"},
       {R"({"best": null})", "'best' is missing"},
-      {R"({"best": 1})", "'best' is number"},
+      {R"({"best": 1})", "'best' is 1, not a label"},
       {R"({"best": "C"})", "'best' 'C' has no probability"},
       {R"({"identity": null})", "'identity' is missing"},
       {R"({"identity": {"A": 1.5}})", "'identity.A' = 1.5, not a probability; give 0 to 1"},
@@ -127,7 +118,7 @@ TEST(ResultsThatCannotBeJudged, AreRefusedByFileRecordAndField) {
       {R"({"identity": {"A": 0.5}})", "'identity' sums to 0.75"},
       {R"({"none": 2})", "'none' = 2, not a probability; give 0 to 1"},
       {R"({"none": "?"})", "'none' is string"},
-      {R"({"fit": 1.0})", "'fit' is number"},
+      {R"({"fit": 1.0})", "'fit' is 1.0, not an object"},
       {R"({"fit": {"z": "x"}})", "'fit.z' is string"},
       {R"({"truth": "A"})", "'truth' is string"},
       {R"({"truth": {"object": null}})", "'truth.object' is missing"},

@@ -122,11 +122,7 @@ TEST_F(InfoCommand, SensorModel) {
       .temperature = 31.5,
       .temperature_growth = 0.75,
       .bins = BinSteps{.x_mm = 0.8, .y_mm = 0.4, .theta_rad = std::numbers::pi / 8.0},
-      .fit_scale = FitScale{.mean = -4.5,
-                            .sd = 12.25,
-                            .single_touch = SingleFitScale{1.5, 0.75},
-                            .stranger_sd = 3.5,
-                            .stranger_single_touch = SingleFitScale{-2.5, 1.25}},
+      .fit_scale = FitScale{.mean = -4.5, .sd = 12.25},
       .pose_scale = PoseScale{.factor = 0.75, .map_sd_mm = 0.125}};
   sensor.maps = {{"pen.map.h5", "1a"}, {"mug.map.h5", "2b"}};
   sensor.table->shared.assign(3 * ReadingLayer::nodes, -1.0);
@@ -138,9 +134,7 @@ TEST_F(InfoCommand, SensorModel) {
        "table of 3 levels over log odds; 1 object(s) with numbers of their own",
        "temperature       31.5, and 0.75 more for every further touch",
        "learned on bins   0.8 x 0.4 mm x 22.5 deg",
-       "z of learned objects -4.5 +- 12.25, of a single touch where it fits best 1.5 +- 0.75, of "
-       "strangers +- 3.5 more on it for every further touch, of a single touch of strangers -2.5 "
-       "+- 1.25 on it",
+       "fit scale         z of learned objects -4.5 +- 12.25",
        "learned for       mug.map.h5, pen.map.h5",
        "pose scale        covariances times 0.75, and 0.125 mm of the map along each axis"});
 }

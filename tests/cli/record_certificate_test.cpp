@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "cli/record_table.hpp"
-#include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "recognition/record_json.hpp"
 #include "support/sample_files.hpp"
@@ -67,17 +66,19 @@ TEST(UnprovenSentence, SaysTheBoundsAndWhatEndedTheSearch) {
             "A 62.0 % (at least 10.0 %, at most 99.0 %): the budget of 100 ms left the "
             "probability of (none) unproven");
   EXPECT_EQ(unproven_sentence(record_of(0.37, {{1.0, 1.0}, {0.0, 0.0}}).last(), task_with({})),
-            "rounding left 37 % of the belief unproven; A has 100.0 % all the same");
+            "A 62.0 % (at least 100.0 %, at most 100.0 %): rounding left 37 % of the belief "
+            "unproven");
   const auto with_poor_fits = [](std::int64_t bins) {
     return RecognitionTask({{sample_map("A")}, {sample_map("I")}},
                            BoundedOptions{.poor_bins = bins});
   };
   const RecognitionRecord little = record_of(2.3e-6, {{1.0, 1.0}, {0.0, 0.0}});
   EXPECT_EQ(unproven_sentence(little.last(), with_poor_fits(1234)),
-            "the search, which met nothing but poor fits, left 0.00023 % of the belief unproven; A "
-            "has 100.0 % all the same");
+            "A 62.0 % (at least 100.0 %, at most 100.0 %): the search, which met nothing but poor "
+            "fits, left 0.00023 % of the belief unproven");
   EXPECT_EQ(unproven_sentence(little.last(), with_poor_fits(1235)),
-            "rounding left 0.00023 % of the belief unproven; A has 100.0 % all the same");
+            "A 62.0 % (at least 100.0 %, at most 100.0 %): rounding left 0.00023 % of the belief "
+            "unproven");
   EXPECT_EQ(unproven_sentence(record_of(1e-4, {{0.6, 0.64}, {0.36, 0.4}}).last(), task_with(0.1)),
             "")
       << "the tolerance holds";
@@ -102,10 +103,10 @@ TEST(Certificate, IsSaidWhereProbabilitiesAre) {
   touch.touch.T_robot_sensor = Pose{};
   touch.step = wide.last();
   EXPECT_THAT(summary(state, {}, task), HasSubstr("\n" + sentence + "\n"));
-  EXPECT_THAT(LiveTable(task).heading(), HasSubstr("prob.  dropped"));
-  EXPECT_THAT(LiveTable(task).line(*state.last), HasSubstr("0.620        1"));
-  const std::string heading = LiveTable(task).heading();
-  EXPECT_EQ(LiveTable(task).line(*state.last).find(" 0.00 "), heading.find("x mm") - 1)
+  EXPECT_THAT(live_heading(task), HasSubstr("prob.  dropped"));
+  EXPECT_THAT(live_line(*state.last, task), HasSubstr("0.620        1"));
+  const std::string heading = live_heading(task);
+  EXPECT_EQ(live_line(*state.last, task).find(" 0.00 "), heading.find("x mm") - 1)
       << "columns stand below their names\n"
       << heading;
 

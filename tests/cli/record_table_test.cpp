@@ -8,7 +8,6 @@
 
 #include <numbers>
 
-#include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "cli/text_table.hpp"
 #include "palpate/pose_error.hpp"
@@ -106,17 +105,14 @@ TEST(ResultTable, SaysFirstWhetherToActAndBelowWhereElseTheObjectMayBe) {
   EXPECT_EQ(json["modes"][1]["covariance"][1][1], 0.09);
 }
 
-TEST(ResultTable, SaysForHowManyUnknownsTurnsCountAsEqual) {
+TEST(ResultTable, SaysThatTurnsCountAsEqual) {
   RecognitionRecord record = sample_record("mug.h5");
   EXPECT_THAT(result_table({record}, sample_task()), Not(HasSubstr("looks the same")));
   RecognitionRecord folded = record;
   folded.trace.back().symmetry = 2;
-  EXPECT_THAT(result_table({folded}, sample_task()),
-              HasSubstr("A looks the same after every 1/2 of a turn: its theta is given from -90 "
-                        "to 90 deg\n"));
-  EXPECT_THAT(result_table({record, folded, folded}, sample_task()),
-              HasSubstr("A looks the same after every 1/2 of a turn, as far as the touches of 2 of "
-                        "these unknowns tell: their theta is given from -90 to 90 deg\n"));
+  EXPECT_TRUE(result_table({record, folded, folded}, sample_task())
+                  .ends_with("  31.51\nA looks the same after every 1/2 of a turn: its theta is "
+                             "given from -90 to 90 deg\n"));
 }
 
 TEST(ResultTable, GivesThePoseItsOwnShareOfTheBelief) {
@@ -134,7 +130,7 @@ TEST(ResultTable, GivesThePoseItsOwnShareOfTheBelief) {
             "  mode              A                    399.00        -20.00        31.51\n");
   EXPECT_EQ(identity_words(step, task), "I (58.0 %), pose of A (15.2 % there)");
   LiveTouch touch{.touch = {.T_robot_sensor = Pose{}}, .step = step};
-  EXPECT_THAT(LiveTable(task).line(touch), HasSubstr("I, pose of A  0.580    0.152 "));
+  EXPECT_THAT(live_line(touch, task), HasSubstr("I, pose of A  0.580    0.152 "));
   step.best = 0;
   step.places.share = 0.25;
   EXPECT_EQ(identity_words(step, task), "A (40.0 %, 25.0 % there)");
@@ -209,7 +205,6 @@ TEST(ResultTable, SaysWhichObjectAWrongOneWasAndWhosePoseItIs) {
   const std::string text = result_table({record}, sample_task());
   EXPECT_THAT(text, HasSubstr("\n  truth             I"));
   EXPECT_THAT(text, HasSubstr("wrong object\n0 of 1 right (0.0 %)\n"));
-  EXPECT_THAT(text, HasSubstr("\nobject   right  taken for\nI       0 of 1  1 A\n"));
 
   record.trace.back().identity = {0.4, 0.6};
   record.trace.back().best = 1;
@@ -328,9 +323,9 @@ TEST(RecordOutput, SaysTheSameNumbersEverywhere) {
                                "\nthe poses look like metres\n"))
       << summary(state, {}, task);
   for (const char* part : {" 398.76+-0.05 ", " -20.50+-0.10 ", " 28.65+-0.57 ", "no fit"}) {
-    EXPECT_THAT(LiveTable(task).line(*state.last), HasSubstr(part));
+    EXPECT_THAT(live_line(*state.last, task), HasSubstr(part));
   }
-  EXPECT_THAT(LiveTable(task).line(*state.last), HasSubstr(" " + error + " "));
+  EXPECT_THAT(live_line(*state.last, task), HasSubstr(" " + error + " "));
   const nlohmann::json live = to_json(*state.last, task);
   for (const char* key : {"refined", "truth", "fit", "warnings", "refined_error_mm"}) {
     EXPECT_EQ(live.at(key), json.at(key)) << key;
@@ -364,31 +359,11 @@ TEST(RecordOutput, AWrongObjectIsRedOnTheSheet) {
   EXPECT_FALSE(sheet.truth);
 }
 
-TEST(ShortenMiddle, KeepsBothEndsOfALongName) {
-  EXPECT_EQ(shorten_middle("mug.h5", 6), "mug.h5");
-  EXPECT_EQ(shorten_middle("left-hand-mug-000123.h5", 12), "left-...3.h5");
-  EXPECT_EQ(shorten_middle("left-hand-mug-000123.h5", 11), "left...3.h5");
-  EXPECT_EQ(shorten_middle("left", 3), "lef");
-  EXPECT_EQ(shorten_middle("left", 0), "");
-}
-
-TEST(ShortenMiddle, CountsCharactersNotBytes) {
-  EXPECT_EQ(shorten_middle("äöüäöü", 6), "äöüäöü");
-  EXPECT_EQ(shorten_middle("äöüäöüäöü", 7), "äö...öü");
-}
-
-TextTable sample() {
-  TextTable table({{"recording"}, {"mm", true}, {"nothing"}, {"best"}});
-  table.add({"a-recording-of-a-long-name.h5", "-1.25", "", "a-label-of-many-letters"});
-  table.add({"b.h5", "10.50", "", "B"});
-  return table;
-}
-
-TEST(TextTable, IsAsWideAsItsContentAndLeavesOutWhatIsEmpty) {
-  EXPECT_EQ(sample().text(),
-            "recording                         mm  best\n"
-            "a-recording-of-a-long-name.h5  -1.25  a-label-of-many-letters\n"
-            "b.h5                           10.50  B\n");
+TEST(Shortened, CountsCharactersNotBytes) {
+  EXPECT_EQ(shortened("mug.h5", 6), "mug.h5");
+  EXPECT_EQ(shortened("left-hand-mug.h5", 12), "left-hand...");
+  EXPECT_EQ(shortened("äöüäöü", 6), "äöüäöü");
+  EXPECT_EQ(shortened("äöüäöüäöü", 7), "äöüä...");
 }
 
 TEST(TextTable, ShowsNoControlCharacter) {

@@ -10,8 +10,8 @@
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "support/certified.hpp"
-#include "support/sanitized.hpp"
 #include "support/synthetic.hpp"
+#include "support/trials.hpp"
 
 namespace palpate {
 

@@ -13,7 +13,7 @@
 #include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
 #include "support/memory_limit.hpp"
-#include "support/sanitized.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::hostile_file_test {
 

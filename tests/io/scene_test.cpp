@@ -1,4 +1,4 @@
-#include "palpate/scene.hpp"
+#include "palpate/files.hpp"
 
 #include <gtest/gtest.h>
 
@@ -120,50 +120,38 @@ TEST_F(SceneFile, NamesKeysThatItDoesNotKnow) {
 }
 
 TEST_F(SceneFile, NamesValuesThatItCannotTake) {
-  for (const auto& [yaml, key] : {std::pair{"threshold: high", "threshold"},
-                                  {"threshold: -1", "threshold"},
-                                  {"threshold: .nan", "threshold"},
-                                  {"threshold: .inf", "threshold"},
-                                  {"threshold: 2 kPa", "threshold"},
-                                  {"threshold: 1,5", "threshold"},
-                                  {"threshold: 1.500,25", "threshold"},
-                                  {"bins: [1.000, 1, 1]", "bins"},
-                                  {"threshold: [2]", "threshold"},
-                                  {"threshold:", "threshold"},
-                                  {"ratio: 1", "ratio"},
-                                  {"gamma: 1", "gamma"},
-                                  {"gamma: -0.1", "gamma"},
-                                  {"prior: 0", "prior"},
-                                  {"prior: 1", "prior"},
-                                  {"array: []", "array"},
-                                  {"array: {}", "array"},
-                                  {"array: [1, 2]", "array[0]"},
+  const std::pair<const char*, std::vector<const char*>> keys[] = {
+      {"threshold", {"high", "-1", ".nan", ".inf", "2 kPa", "1,5", "1.500,25", "[2]", ""}},
+      {"ratio", {"1"}},
+      {"gamma", {"1", "-0.1"}},
+      {"prior", {"0", "1"}},
+      {"array", {"[]", "{}"}},
+      {"objects", {"A.h5"}},
+      {"region", {"10"}},
+      {"bins",
+       {"[25, 25]", "[25, 25, 0]", "[25, 2.5, 16]", "[0x10, 1, 1]", "[1e1, 1, 1]", "[1.0, 1, 1]",
+        "[1.000, 1, 1]", "[2147483648, 1, 1]", "[' 1', 1, 1]", "coarse"}},
+      {"sensor_model", {"[s.yaml]"}},
+      {"filter", {"kalman"}},
+      {"device", {"[0]"}}};
+  for (const auto& [key, values] : keys) {
+    for (const std::string value : values) {
+      expect_named(message(key + (": " + value)), {"line 1", key});
+    }
+  }
+  for (const auto& [yaml, key] : {std::pair{"array: [1, 2]", "array[0]"},
                                   {"array: [[1, 2], [1, x]]", "array[1][1]"},
-                                  {"objects: A.h5", "objects"},
                                   {"objects: [A.h5]", "objects[0]"},
                                   {"objects: [{label: A}]", "map"},
                                   {"objects: [{map: A.h5, symmetry: -1}]", "symmetry"},
                                   {"objects: [{map: A.h5, symmetry: 1.5}]", "symmetry"},
                                   {"objects: [{map: A.h5, weight: 0}]", "weight"},
                                   {"objects: [{map: A.h5, mirror: 1}]", "mirror"},
-                                  {"sensor_model: [s.yaml]", "sensor_model"},
                                   {"objects: [{map: A.h5, label: ''}]", "label"},
-                                  {"region: 10", "region"},
                                   {"region: {x_mm: [10, -10]}", "x_mm"},
                                   {"region: {y_mm: [0]}", "y_mm"},
                                   {"region: {pivot_mm: [0, .nan]}", "pivot_mm"},
                                   {"region: {pivot_mm: here}", "pivot_mm"},
-                                  {"bins: [25, 25]", "bins"},
-                                  {"bins: [25, 25, 0]", "bins"},
-                                  {"bins: [25, 2.5, 16]", "bins"},
-                                  {"bins: [0x10, 1, 1]", "bins"},
-                                  {"bins: [1e1, 1, 1]", "bins"},
-                                  {"bins: [1.0, 1, 1]", "bins"},
-                                  {"bins: [2147483648, 1, 1]", "bins"},
-                                  {"bins: [' 1', 1, 1]", "bins"},
-                                  {"bins: coarse", "bins"},
-                                  {"filter: kalman", "filter"},
-                                  {"device: [0]", "device"},
                                   {"- ratio: 0.3", "the scene"}}) {
     expect_named(message(yaml), {"line 1", key});
   }
@@ -172,6 +160,7 @@ TEST_F(SceneFile, NamesValuesThatItCannotTake) {
 TEST_F(SceneFile, IsOneDocumentOfYaml) {
   EXPECT_EQ(read("---\nratio: 0.3\n...\n").options.at("ratio"), "0.3");
   expect_named(message("ratio: 0.3\n---\nbins: auto"), {"line 2", "second document"});
+  expect_named(message("ratio: 0.3\n...\n\nbins: auto"), {"line 4", "second document"});
   expect_named(message("ratio: 0.3\nobjects: [1, 2\nbins: 3"), {"line", "YAML"});
   expect_named(input_error([&] { read_scene(folder_ / "no.yaml"); }), {"no.yaml", "no such file"});
 }

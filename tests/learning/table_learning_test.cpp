@@ -9,8 +9,9 @@
 
 #include "learning/press_placement.hpp"
 #include "model/bounding_box.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
-#include "palpate/reading_layer.hpp"
+#include "palpate/learned_sensor.hpp"
 #include "simulated_presses.hpp"
 #include "support/errors.hpp"
 #include "support/synthetic.hpp"

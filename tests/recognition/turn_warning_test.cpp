@@ -9,7 +9,6 @@
 #include <glm/matrix.hpp>
 
 #include "recognition/decision.hpp"
-#include "recognition/warnings.hpp"
 #include "shapes.hpp"
 
 namespace palpate::turn_warning_test {
@@ -77,14 +76,6 @@ TEST(TurnWarning, TurnsThatTouchesDoNotTellApartCountAsEqual) {
   EXPECT_THAT(i.warnings, ElementsAre(AllOf(HasSubstr("I looks the same after every 1/2 of a turn"),
                                             HasSubstr("`symmetry 2`"))));
   EXPECT_EQ(i.symmetry, 2);
-}
-
-TEST(TurnWarning, SaysThatAnErrorIsSuchATurn) {
-  // Touches tell the turns of an A apart, whatever its map says.
-  const RecognitionStep a = step_of("A", 2, 1, std::numbers::pi);
-  EXPECT_EQ(a.symmetry, 1);
-  EXPECT_THAT(a.warnings, ElementsAre(AllOf(HasSubstr("the pose error of "),
-                                            HasSubstr(" mm where such turns do not count"))));
 }
 
 TEST(LeastTurned, ThetaOfSymmetricObjectsLiesWithinOneTurnOfThem) {

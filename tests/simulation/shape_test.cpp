@@ -123,11 +123,6 @@ TEST(Shape, AIsOpenBelowItsBarAndPointsUp) {
   }
 }
 
-TEST(Shape, LowerCaseLettersAreTheirCapitals) {
-  EXPECT_EQ(make_shape("e").label, "E");
-  EXPECT_EQ(rasterize(make_shape("e")), rasterize(make_shape("E")));
-}
-
 TEST(Shape, UnknownNamesListWhatThereIs) {
   for (const char* name : {"", "?", "AB", "Ring", "no_such_file.txt", "."}) {
     const std::string quoted = std::string("'") + name + "'";

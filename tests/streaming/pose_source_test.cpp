@@ -249,7 +249,6 @@ TEST_F(PoseFifo, EveryKindOfFaultIsSaidOnce) {
   tell(text + lines(0, 5, -3600.0));
   const std::vector<std::vector<const char*>> kinds = {
       {"line 1", "JSON"},
-      {"line 2", "longer"},
       {"line 3", "'x_mm'"},
       {"line 4", "1.7e+308"},
       {"line 6", "not later", "1699999970 s", "1700000000 s"},

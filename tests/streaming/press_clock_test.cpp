@@ -7,7 +7,7 @@
 
 #include <gmock/gmock.h>
 
-#include "streaming/import_array.hpp"
+#include "streaming/import_steps.hpp"
 #include "streaming/press_clock.hpp"
 #include "support/limits.hpp"
 
@@ -158,6 +158,7 @@ TEST(ImportSurvey, DeadElementsLoadNothing) {
   const ImportSurvey found = survey({1.0, 0.0, 2.5, 4000.0}, {1, 0});
   EXPECT_THAT(found.load, ElementsAre(0, 1.5F));
   EXPECT_FALSE(found.whole_up_to);
+  EXPECT_FALSE(survey({1.0, 99.0}, {1, 1}).whole_up_to) << "pressures may be small whole numbers";
 }
 
 }  // namespace palpate::press_clock_test

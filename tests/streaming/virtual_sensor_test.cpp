@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <numbers>
 
-#include "palpate/baseline.hpp"
 #include "palpate/files.hpp"
+#include "palpate/sensor.hpp"
 #include "palpate/simulation.hpp"
 #include "press.hpp"
 #include "support/limits.hpp"
@@ -227,17 +227,9 @@ TEST_F(ReplayedFile, RefusesWhatIsNoStream) {
 }
 
 TEST(VirtualSensor, KnowsWhatFloodsWithoutAnEnd) {
-  // 184 bytes a frame of 36 elements, and 16 KiB a frame of 4,096.
-  for (const char* endless :
-       {"simulate:A,speed=max", "simulate:A,rate=1000,speed=101", "simulate:A,rate=100000",
-        "simulate:A,rate=1000,array=64:64:1", "simulate:A,array=64:64:1,speed=100",
-        "simulate:A,rate=100000,array=1:1:1,speed=10"}) {
-    EXPECT_TRUE(is_endless_flood(endless)) << endless;
-  }
-  for (const char* name :
-       {"simulate:A,rate=50000", "simulate:A,rate=1,speed=10000", "simulate:A,array=64:64:1",
-        "simulate:A,rate=100000,touches=3", "simulate:A,speed=100", "simulate:A",
-        "simulate:A,touches=3,speed=max", "replay:a.h5,speed=max", "takktile"}) {
+  EXPECT_TRUE(is_endless_flood("simulate:A,speed=max"));
+  for (const char* name : {"simulate:A,speed=100", "simulate:A", "simulate:A,touches=3,speed=max",
+                           "replay:a.h5,speed=max", "takktile"}) {
     EXPECT_FALSE(is_endless_flood(name)) << name;
   }
 }

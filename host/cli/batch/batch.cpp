@@ -25,20 +25,15 @@ namespace palpate::cli {
 
 namespace {
 
-/// A batch whose task stands in its results folder.
-struct SettledBatch {
-  BatchTask task;
-  RecognitionJob job;
-};
-
 /// Settles once for all shards what a results folder computes: by the task file that is there or,
 /// where there is none, by writing it. Everything that follows from all inputs together, or from
 /// the device at hand, is settled here, so that no chunk depends on who computes it.
 /// @param asked program, chunk_unknowns, request, files and stamped inputs
 /// @param request completed
 /// @throws Error (Fault::input) where the folder has results of another task
-SettledBatch settle_batch(const ResultsFolder& folder, const BatchTask& asked,
-                          const Request& request, std::size_t threads) {
+std::pair<BatchTask, RecognitionJob> settle_batch(const ResultsFolder& folder,
+                                                  const BatchTask& asked, const Request& request,
+                                                  std::size_t threads) {
   if (!folder.has_task()) {
     BatchTask task = asked;
     with_progress("looking through the recordings",
@@ -138,19 +133,6 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-/// Recognises what is missing of the shard. Returns the counts of this run.
-BatchCounts compute(const BatchRun& run) {
-  run.job.device();  // opens it before the line of progress is there
-  Progress progress("recognising");
-  const auto begin = std::chrono::steady_clock::now();
-  return run_batch(run, [&](const BatchCounts& counts) {
-    const double seconds = seconds_since(begin);
-    progress.show(static_cast<double>(counts.done) / static_cast<double>(run.to_be_done),
-                  fmt::format(", {:.0f} per second{}", static_cast<double>(counts.done) / seconds,
-                              counts.failed > 0 ? fmt::format(", {} failed", counts.failed) : ""));
-  });
-}
-
 std::string batch_summary(const BatchArguments& options, const Shard& shard, const Chunks& chunks,
                           const BatchCounts& now, double seconds) {
   const std::size_t failed = chunks.finished.failed + now.failed;
@@ -186,19 +168,28 @@ void batch(const BatchArguments& options) {
   folder.require_own();
   const std::size_t threads =
       options.threads > 0 ? static_cast<std::size_t>(options.threads) : cores();
-  const SettledBatch settled = settle_batch(folder, asked, request, threads);
-  const Chunks chunks = chunks_of(folder, settled.task, shard);
+  const auto [task, job] = settle_batch(folder, asked, request, threads);
+  const Chunks chunks = chunks_of(folder, task, shard);
   const auto begin = std::chrono::steady_clock::now();
   BatchCounts now;
   if (chunks.to_be_done > 0) {
     folder.make();
-    now = compute({.folder = folder,
-                   .task = settled.task,
-                   .job = settled.job,
-                   .wanted = chunks.wanted,
-                   .to_be_done = chunks.to_be_done,
-                   .threads = threads,
-                   .verbose = options.verbose});
+    job.device();  // opens it before the line of progress is there
+    Progress progress("recognising");
+    const BatchRun run{.folder = folder,
+                       .task = task,
+                       .job = job,
+                       .wanted = chunks.wanted,
+                       .to_be_done = chunks.to_be_done,
+                       .threads = threads,
+                       .verbose = options.verbose};
+    now = run_batch(run, [&](const BatchCounts& counts) {
+      const auto done = static_cast<double>(counts.done);
+      progress.show(
+          done / static_cast<double>(run.to_be_done),
+          fmt::format(", {:.0f} per second{}", done / seconds_since(begin),
+                      counts.failed > 0 ? fmt::format(", {} failed", counts.failed) : ""));
+    });
   }
   fmt::print("{}", batch_summary(options, shard, chunks, now, seconds_since(begin)));
   if (chunks.finished.failed + now.failed > 0) {
@@ -216,15 +207,11 @@ void add_batch(CLI::App& app) {
       "cannot be recognised becomes a record with its error, and the exit status is 3. Several "
       "processes or machines share the work by --shard; palpate merge joins the results",
       batch);
-  command
-      ->add_option("INPUT", options->inputs,
-                   "Manifests (*.csv with the columns path, frames and label, of which path alone "
-                   "must be there), folders of recordings, recordings, or quoted patterns of them")
-      ->required();
-  command
-      ->add_option("-o,--output", options->results,
-                   "Folder of results; made where it is missing, else completed")
-      ->required();
+  add_required(*command, "INPUT", options->inputs,
+               "Manifests (*.csv with the columns path, frames and label, of which path alone "
+               "must be there), folders of recordings, recordings, or quoted patterns of them");
+  add_required(*command, "-o,--output", options->results,
+               "Folder of results; made where it is missing, else completed");
   add_recognition_flags(*command, options->request, options->verbose);
   command->get_option("--budget-ms")->group("");  // read still, to be refused with its reason
   add_selection_flags(*command, options->request);

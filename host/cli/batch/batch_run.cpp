@@ -7,8 +7,8 @@
 #include <chrono>
 #include <climits>
 #include <condition_variable>
-#include <deque>
 #include <exception>
+#include <future>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -27,9 +27,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Most bytes of unknowns that have been read and wait to be recognised; a single one may be
-/// larger.
-constexpr std::size_t most_waiting_bytes = 64 << 20;
 /// How often progress is shown where nothing else happens.
 constexpr auto pause = 200ms;
 
@@ -38,6 +35,12 @@ struct Job {
   std::size_t index;  ///< among all unknowns
   std::shared_ptr<const Recording> recording;
   Query unknown;
+};
+
+/// An input that has been read.
+struct NumberedInput {
+  std::size_t first = 0;  ///< index of its first unknown among all
+  ReadInput input = {};
 };
 
 /// The lines of a chunk, some of which are still missing.
@@ -58,10 +61,13 @@ std::size_t most_at_once(const RecognitionTask& task, std::size_t threads) {
     return 1;
   }
   // A device that has few bins waits for the host, unless another thread gives it work meanwhile.
-  constexpr std::int64_t filling_bins = 4'000'000;
-  constexpr std::int64_t limit = 16;
-  const auto together = std::clamp<std::int64_t>(filling_bins / task.bins_in_all(), 1, limit);
-  return std::min(threads, static_cast<std::size_t>(together));
+  constexpr double filling_bins = 4e6;
+  constexpr double limit = 16.0;
+  // In float64, as counts of three axes may exceed an integer.
+  const PoseLattice& lattice = task.lattice();
+  const double bins = static_cast<double>(task.hypotheses.size()) * lattice.x_mm.count *
+                      lattice.y_mm.count * lattice.theta_rad.count;
+  return std::min(threads, static_cast<std::size_t>(std::clamp(filling_bins / bins, 1.0, limit)));
 }
 
 std::string host_name() {
@@ -69,16 +75,7 @@ std::string host_name() {
   return ::gethostname(name, sizeof name - 1) == 0 ? name : "";
 }
 
-std::size_t bytes_of(const Query& unknown) {
-  constexpr std::size_t least = 4096;
-  std::size_t bytes = least;
-  for (const Touch& touch : unknown.touches) {
-    bytes += sizeof(Touch) + touch.pressure.size() * (sizeof(double) + sizeof(glm::dvec2));
-  }
-  return bytes;
-}
-
-/// Threads that read unknowns, and threads that recognise them and write the chunks.
+/// Threads that take unknowns, recognise them and write the chunks, and one that reads ahead.
 class Pipeline {
  public:
   explicit Pipeline(const BatchRun& run)
@@ -93,15 +90,11 @@ class Pipeline {
 
   BatchCounts run(const std::function<void(const BatchCounts&)>& progress) {
     recognisers_left_ = recognisers_;
-    readers_left_ = (recognisers_ + 1) / 2;
+    read_ahead();
     std::vector<std::jthread> threads;
     try {
-      for (std::size_t i = (recognisers_ + 1) / 2; i > 0; --i) {
-        threads.emplace_back([this] { guard([this] { read(); }, readers_left_); });
-      }
       for (std::size_t i = 0; i < recognisers_; ++i) {
-        threads.emplace_back(
-            [this, i] { guard([this, i] { recognise_unknowns(i == 0); }, recognisers_left_); });
+        threads.emplace_back([this, i] { guard([this, i] { recognise_unknowns(i == 0); }); });
       }
       tell_until_end(progress);
     } catch (...) {
@@ -132,21 +125,22 @@ class Pipeline {
   void fail(const std::exception_ptr& failure) {
     const std::lock_guard lock(mutex_);
     failure_ = failure_ ? failure_ : failure;
-    room_.notify_all();
-    arrived_.notify_all();
+  }
+  bool failed() {
+    const std::lock_guard lock(mutex_);
+    return failure_ != nullptr;
   }
 
-  /// Runs one of `left` threads.
+  /// Runs the work of a recognising thread.
   template <typename Work>
-  void guard(const Work& work, std::size_t& left) {
+  void guard(const Work& work) {
     try {
       work();
     } catch (...) {
       fail(std::current_exception());
     }
     const std::lock_guard lock(mutex_);
-    if (--left == 0) {
-      arrived_.notify_all();
+    if (--recognisers_left_ == 0) {
       ended_.notify_one();
     }
   }
@@ -163,55 +157,37 @@ class Pipeline {
     return false;
   }
 
-  void read() {
-    for (std::size_t i = next_input_++; i < first_.size(); i = next_input_++) {
-      if (is_wanted(i) &&
-          !push_unknowns(i, read_entry(run_.task, run_.task.inputs[i], run_.job.request()))) {
-        return;
+  /// Begins to read the next input that has wanted unknowns. libhdf5 reads one file at a time.
+  void read_ahead() {
+    while (next_input_ < first_.size() && !is_wanted(next_input_)) {
+      ++next_input_;
+    }
+    if (next_input_ < first_.size()) {
+      ahead_ = std::async(std::launch::async, [this, input = next_input_++] {
+        return NumberedInput{first_[input],
+                             read_entry(run_.task, run_.task.inputs[input], run_.job.request())};
+      });
+    }
+  }
+
+  /// The next unknown that is wanted; none where all are taken or another thread has failed.
+  std::optional<Job> next() {
+    const std::lock_guard reading(reading_mutex_);
+    while (!failed()) {
+      std::vector<Query>& unknowns = present_.input.unknowns;
+      for (; taken_ < unknowns.size(); ++taken_) {
+        if (const std::size_t index = present_.first + taken_; run_.wanted[chunk_of(index)]) {
+          return Job{index, present_.input.recording, std::move(unknowns[taken_++])};
+        }
       }
-    }
-  }
-
-  /// False where another thread has failed.
-  bool push_unknowns(std::size_t input, ReadInput read) {
-    for (std::size_t i = 0; i < read.unknowns.size(); ++i) {
-      const std::size_t index = first_[input] + i;
-      if (run_.wanted[chunk_of(index)] &&
-          !push({index, read.recording, std::move(read.unknowns[i])})) {
-        return false;
+      if (!ahead_.valid()) {
+        break;
       }
+      present_ = ahead_.get();
+      taken_ = 0;
+      read_ahead();
     }
-    return true;
-  }
-
-  /// Waits for room. False where another thread has failed.
-  bool push(Job job) {
-    const std::size_t bytes = bytes_of(job.unknown);
-    std::unique_lock lock(mutex_);
-    room_.wait(lock, [&] {
-      return failure_ || waiting_.empty() || waiting_bytes_ + bytes <= most_waiting_bytes;
-    });
-    if (failure_) {
-      return false;
-    }
-    waiting_bytes_ += bytes;
-    waiting_.push_back(std::move(job));
-    arrived_.notify_one();
-    return true;
-  }
-
-  /// Waits for an unknown; none where all have been taken or another thread has failed.
-  std::optional<Job> pop() {
-    std::unique_lock lock(mutex_);
-    arrived_.wait(lock, [&] { return failure_ || !waiting_.empty() || readers_left_ == 0; });
-    if (failure_ || waiting_.empty()) {
-      return {};
-    }
-    std::optional<Job> job(std::move(waiting_.front()));
-    waiting_.pop_front();
-    waiting_bytes_ -= bytes_of(job->unknown);
-    room_.notify_one();
-    return job;
+    return {};
   }
 
   void recognise_unknowns(bool first) {
@@ -220,7 +196,7 @@ class Pipeline {
     if (first && run_.verbose) {
       print_engine(run_.job, recogniser);
     }
-    while (const std::optional<Job> job = pop()) {
+    while (const std::optional<Job> job = next()) {
       const RecognitionRecord record = recognise(recogniser, task_, job->unknown, trace);
       if (record.error.empty()) {
         tell_once(recogniser.unresolved_words());
@@ -285,16 +261,16 @@ class Pipeline {
   const std::size_t unknowns_;
   std::vector<std::size_t> first_;  ///< [input] index of its first unknown
   std::size_t recognisers_ = 1;
-  std::atomic<std::size_t> next_input_ = 0;
   std::atomic<bool> told_ = false;
 
-  std::mutex mutex_;                 ///< of what follows
-  std::condition_variable room_;     ///< for one more unknown; readers wait for it
-  std::condition_variable arrived_;  ///< an unknown, or the last one; recognisers wait for it
-  std::condition_variable ended_;    ///< all recognisers
-  std::deque<Job> waiting_;
-  std::size_t waiting_bytes_ = 0;
-  std::size_t readers_left_ = 0;
+  std::mutex reading_mutex_;  ///< of what follows
+  std::size_t next_input_ = 0;
+  std::future<NumberedInput> ahead_;  ///< the input after this one; invalid after the last
+  NumberedInput present_;
+  std::size_t taken_ = 0;  ///< of its unknowns
+
+  std::mutex mutex_;               ///< of what follows
+  std::condition_variable ended_;  ///< all recognisers
   std::size_t recognisers_left_ = 0;
   std::exception_ptr failure_;  ///< the first one
   std::map<std::size_t, OpenChunk> open_;

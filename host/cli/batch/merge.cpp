@@ -107,8 +107,7 @@ void add_merge(CLI::App& app) {
                                   "Join the results of palpate batch: one record a line (NDJSON), "
                                   "in the order of the inputs. Says what is missing",
                                   merge);
-  command->add_option("RESULTS", options->results, "Folder of results of palpate batch")
-      ->required();
+  add_required(*command, "RESULTS", options->results, "Folder of results of palpate batch");
   command->add_option("-o,--output", options->output,
                       "File to write; - is standard output [default: -]");
   command->add_flag("--partial", options->partial,

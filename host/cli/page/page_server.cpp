@@ -12,7 +12,6 @@
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
-#include <semaphore>
 #include <thread>
 #include <utility>
 
@@ -154,25 +153,6 @@ class LimitedStream : public httplib::Stream {
   Clock::duration patience_ = most_patience_;
 };
 
-/// Threads for connections. Where many wait, the next are not accepted, so that they cannot take
-/// all file descriptors of the program.
-class Connections : public httplib::ThreadPool {
- public:
-  Connections(int threads, int limit)
-      : httplib::ThreadPool(static_cast<std::size_t>(threads)), room_(limit) {}
-
-  void enqueue(std::function<void()> serve) override {
-    room_.acquire();
-    httplib::ThreadPool::enqueue([this, serve = std::move(serve)] {
-      serve();
-      room_.release();
-    });
-  }
-
- private:
-  std::counting_semaphore<> room_;
-};
-
 }  // namespace
 
 void add_page_flags(CLI::App& command, PageAddress& address) {
@@ -187,11 +167,9 @@ void add_page_flags(CLI::App& command, PageAddress& address) {
       ->expected(0, 1)
       ->type_name("PORT")
       ->check(CLI::Range(0, 65535));
-  command
-      .add_option("--page-address", address.host,
-                  "Address at which the page is served; 0.0.0.0 shows it to everybody who can "
-                  "reach this machine, and lets them press its buttons")
-      ->capture_default_str();
+  add_with_default(command, "--page-address", address.host,
+                   "Address at which the page is served; 0.0.0.0 shows it to everybody who can "
+                   "reach this machine, and lets them press its buttons");
 }
 
 /// httplib's server within RequestLimits: httplib itself limits each read's time but not a
@@ -211,9 +189,7 @@ struct PageServer::Impl : httplib::Server {
     if (ended < 0) {
       throw Error(Fault::system, "the page: no file descriptor is left; end other programs");
     }
-    new_task_queue = [this] {
-      return new Connections(most_pages + other_requests, limits.connections);
-    };
+    new_task_queue = [] { return new httplib::ThreadPool(most_pages + other_requests); };
   }
   ~Impl() override { ::close(ended); }
 

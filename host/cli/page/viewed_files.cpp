@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <iterator>
 #include <regex>
-#include <set>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -148,26 +147,20 @@ class ViewedMap : public ViewedFile {
   OccupancyGrid map_;
 };
 
-/// What stands behind these keys, each in the object of the one before; null where there is none.
-Json value_at(const nlohmann::json& record, std::initializer_list<const char*> keys) {
-  const nlohmann::json* at = &record;
-  for (const char* key : keys) {
-    if (!at->is_object() || !at->contains(key)) {
-      return nullptr;
-    }
-    at = &at->at(key);
-  }
-  return *at;
+/// What stands behind a pointer such as "/mode/map"; null where there is nothing.
+Json value_at(const nlohmann::json& record, const std::string& pointer) {
+  const nlohmann::json::json_pointer at(pointer);
+  return record.contains(at) ? Json(record.at(at)) : Json();
 }
 
-std::string text_at(const nlohmann::json& record, std::initializer_list<const char*> keys) {
-  const Json value = value_at(record, keys);
+std::string text_at(const nlohmann::json& record, const std::string& pointer) {
+  const Json value = value_at(record, pointer);
   return value.is_string() ? value.get<std::string>() : "";
 }
 
 /// What `live --json` wrote is of touches, one a line.
 bool is_live(const nlohmann::json& record) {
-  return value_at(record, {"unknown"}).is_number() && value_at(record, {"touch"}).is_number();
+  return value_at(record, "/unknown").is_number() && value_at(record, "/touch").is_number();
 }
 
 class ViewedRecords : public ViewedFile {
@@ -204,17 +197,18 @@ class ViewedRecords : public ViewedFile {
 
  private:
   void add(const nlohmann::json& record) {
-    const std::string best = text_at(record, {"best"});
-    const std::string error = text_at(record, {"error"});
-    const Json touches = value_at(record, {"touches"});
-    const Json frame = value_at(record, {"frame"});
+    const std::string best = text_at(record, "/best");
+    const std::string error = text_at(record, "/error");
+    const Json touches = value_at(record, "/touches");
+    const std::string frame =
+        record.contains("frame") ? " frame " + record["frame"].dump() : std::string();
+    const Json identity = value_at(record, "/identity");
     rows_.push_back(Json::array(
-        {text_at(record, {"recording"}) +
-             (record.contains("frame") ? " frame " + frame.dump() : ""),
-         touches.is_number() ? touches : Json(0), error.empty() ? best : error,
-         value_at(record, {"identity", best.c_str()}), value_at(record, {"truth", "object"}),
-         value_at(record, {record.contains("refined_error_mm") ? "refined_error_mm" : "error_mm"}),
-         value_at(record, {"fit", "verdict"}), value_at(record, {"decision", "act"})}));
+        {text_at(record, "/recording") + frame, touches.is_null() ? Json(0) : touches,
+         error.empty() ? best : error, identity.contains(best) ? identity[best] : Json(),
+         value_at(record, "/truth/object"),
+         value_at(record, record.contains("refined_error_mm") ? "/refined_error_mm" : "/error_mm"),
+         value_at(record, "/fit/verdict"), value_at(record, "/decision/act")}));
     records_.push_back(text_of(record));
   }
 
@@ -231,11 +225,11 @@ class ViewedRecords : public ViewedFile {
 
   Json map_of(const nlohmann::json& record) const {
     // Relative to where recognize ran, which may be where this runs, or beside the results.
-    const fs::path named = text_at(record, {"mode", "map"});
+    const fs::path named = text_at(record, "/mode/map");
     for (const fs::path& file : {named, path.parent_path() / named}) {
       try {
         const OccupancyGrid map = read_map(file);
-        return map_json(value_at(record, {"mode", "mirrored"}) == true ? mirror_image(map) : map);
+        return map_json(value_at(record, "/mode/mirrored") == true ? mirror_image(map) : map);
       } catch (const Error&) {
         // A map that is elsewhere now is not shown.
       }
@@ -277,13 +271,10 @@ ViewedFiles::ViewedFiles(std::span<const std::string> paths) {
       files_.push_back(open_file(path));
       continue;
     }
-    std::set<fs::path> inside;
-    for (const auto& entry : fs::directory_iterator(path, error)) {
-      if (is_hdf5(entry.path()) || entry.path().extension() == ".json" ||
-          entry.path().extension() == ".jsonl") {
-        inside.insert(entry.path());
-      }
-    }
+    std::vector<fs::path> inside = paths_in(path);
+    std::erase_if(inside, [](const fs::path& file) {
+      return !is_hdf5(file) && file.extension() != ".json" && file.extension() != ".jsonl";
+    });
     if (inside.empty()) {
       refuse(path, "a folder without *.h5 or *.json; give recordings, maps or results");
     }

@@ -34,9 +34,8 @@ BoundedBelief::BoundedBelief(std::span<const Hypothesis> hypotheses, const Bound
     : options_(options),
       hypotheses_(hypotheses.begin(), hypotheses.end()),
       // More threads than cores gain nothing.
-      threads_(options.threads > 0 ? std::min(options.threads, tbb::info::default_concurrency())
-                                   : tbb::info::default_concurrency()),
-      arena_(threads_),
+      arena_(options.threads > 0 ? std::min(options.threads, tbb::info::default_concurrency())
+                                 : tbb::info::default_concurrency()),
       likelihood_(hypotheses_, options_.contact, options_.lattice, options_.touch_sd),
       space_(arena_.execute([&] { return SearchSpace(hypotheses_, options_); })),
       largest_(space_) {
@@ -98,8 +97,8 @@ void BoundedBelief::take_in() {
 }
 
 std::string BoundedBelief::path() const {
-  return fmt::format("{} on {} thread{}", vector_instructions(), threads_,
-                     threads_ == 1 ? "" : "s");
+  const int threads = arena_.max_concurrency();
+  return fmt::format("{} on {} thread{}", vector_instructions(), threads, threads == 1 ? "" : "s");
 }
 
 std::uint64_t BoundedBelief::bytes() const {
@@ -107,7 +106,7 @@ std::uint64_t BoundedBelief::bytes() const {
   for (const KnownElements& touch : elements_.touches) {
     bytes += touch.undisplaced_bins->bytes();
   }
-  return bytes + (none_ ? none_->bytes() : 0) + (found_ ? found_->bins.bytes() : 0);
+  return bytes + (found_ ? found_->bins.bytes() : 0);
 }
 
 std::vector<double> BoundedBelief::log_likelihood(std::span<const BinBox> boxes,
@@ -204,12 +203,8 @@ BinBelief BoundedBelief::bins() {
                 .objects = {},
                 .visit = [this](std::span<const int> objects, const BlockChoice& /*all*/,
                                 const BinVisitor& visitor) {
-                  std::vector<std::uint8_t> asked(hypotheses_.size());
-                  for (const int object : objects) {
-                    asked[object] = 1;
-                  }
                   visit([&](const BinBox& box, std::span<const double> log_likelihood) {
-                    if (asked[box.object] != 0) {
+                    if (std::ranges::find(objects, box.object) != objects.end()) {
                       visitor(box, log_likelihood);
                     }
                   });

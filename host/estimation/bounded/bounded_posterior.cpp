@@ -90,45 +90,36 @@ std::vector<ProbabilityInterval> identity_bounds(std::span<const double> identit
 
 }  // namespace
 
-struct BoundedPosterior::Impl {
-  Impl(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
-      : belief(hypotheses, options) {
-    for (const Hypothesis& hypothesis : hypotheses) {
-      bodies.push_back(displaced_body(hypothesis.map));
-    }
-  }
+struct BoundedPosterior::Impl : BoundedBelief {
+  using BoundedBelief::BoundedBelief;
 
-  BoundedBelief belief;
   std::optional<PredictedReadings> predicted;  ///< once a gain is asked for
-  std::vector<Body> bodies;                    ///< [hypothesis]
   OwnProcess process;
 };
 
 BoundedPosterior::BoundedPosterior(std::span<const Hypothesis> hypotheses,
                                    const BoundedOptions& options)
-    : impl_(new Impl(hypotheses, checked(options, hypotheses))) {}
-
-void BoundedPosterior::Deleter::operator()(Impl* impl) const { delete_here(impl); }
+    : impl_(new Impl(hypotheses, checked(options, hypotheses)), delete_here<Impl>) {}
 
 BoundedPosterior::Impl& BoundedPosterior::impl() const {
   return held_here(impl_, "bounded posterior");
 }
 
 BoundedPosterior::Impl& BoundedPosterior::with_touches_taken_in() const {
-  Impl& held = impl();
-  held.belief.take_in();
-  return held;
+  Impl& belief = impl();
+  belief.take_in();
+  return belief;
 }
 
-void BoundedPosterior::reset() { impl().belief.reset(); }
+void BoundedPosterior::reset() { impl().reset(); }
 
 void BoundedPosterior::move_pivot(const glm::dvec2& pivot_mm) {
-  with_touches_taken_in().belief.move_pivot(pivot_mm);
+  with_touches_taken_in().move_pivot(pivot_mm);
 }
 
 void BoundedPosterior::update(std::span<const Touch> touches,
                               const std::function<void(double)>& progress) {
-  BoundedBelief& belief = impl().belief;
+  BoundedBelief& belief = impl();
   if (progress) {
     progress(1.0);
   }
@@ -137,7 +128,7 @@ void BoundedPosterior::update(std::span<const Touch> touches,
 
 void BoundedPosterior::update(std::span<const TouchEvidence> touches,
                               const std::function<void(double)>& progress) {
-  BoundedBelief& belief = impl().belief;
+  BoundedBelief& belief = impl();
   if (progress) {
     progress(1.0);
   }
@@ -145,7 +136,7 @@ void BoundedPosterior::update(std::span<const TouchEvidence> touches,
 }
 
 Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
-  BoundedBelief& belief = with_touches_taken_in().belief;
+  BoundedBelief& belief = with_touches_taken_in();
   if (tolerance) {
     require_tolerance(*tolerance);
   }
@@ -183,9 +174,8 @@ Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
 }
 
 RefinedPose BoundedPosterior::refine(const Mode& mode) const {
-  Impl& posterior = with_touches_taken_in();
-  require_object(mode.object, posterior.bodies.size());
-  const BoundedBelief& belief = posterior.belief;
+  const BoundedBelief& belief = with_touches_taken_in();
+  require_object(mode.object, belief.hypotheses().size());
   // Where bins are very fine, a few of them tell the peak, and all would take long. A mean over
   // displacements takes the others all the same.
   const PoseLattice fit = belief.options().touch_sd.none() ? thinned(lattice()) : lattice();
@@ -200,22 +190,22 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   const BinLikelihood& likelihood = of_fit ? *of_fit : belief.likelihood();
   return palpate::refine(
       [&](std::span<const BinBox> boxes) { return belief.log_likelihood(boxes, likelihood); }, fit,
-      posterior.bodies[mode.object], start);
+      displaced_body(belief.hypotheses()[mode.object].map), start);
 }
 
 Marginals BoundedPosterior::marginals(int object) const { return marginals(object, lattice()); }
 
 Marginals BoundedPosterior::marginals(int object, const PoseLattice& grid) const {
-  return with_touches_taken_in().belief.bins().marginals(object, grid);
+  return with_touches_taken_in().bins().marginals(object, grid);
 }
 
 std::vector<std::vector<BinShare>> BoundedPosterior::likely_bins(std::span<const int> objects,
                                                                  double least_share) const {
-  return with_touches_taken_in().belief.bins().likely_bins(objects, least_share);
+  return with_touches_taken_in().bins().likely_bins(objects, least_share);
 }
 
 EvaluatedBelief BoundedPosterior::evaluated_bins() const {
-  BoundedBelief& belief = with_touches_taken_in().belief;
+  BoundedBelief& belief = with_touches_taken_in();
   const SearchResult& found = belief.found();
   struct Bin {
     std::int64_t place;
@@ -254,15 +244,14 @@ EvaluatedBelief BoundedPosterior::evaluated_bins() const {
 }
 
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
-  Impl& posterior = with_touches_taken_in();
-  require_object(object, posterior.bodies.size());
+  const BoundedBelief& belief = with_touches_taken_in();
+  require_object(object, belief.hypotheses().size());
   const auto& [translation_mm, theta_rad] = T_object_robot;
   if (!std::isfinite(translation_mm.x) || !std::isfinite(translation_mm.y) ||
       !std::isfinite(theta_rad)) {
     throw Error(Fault::input, fmt::format("pose {}, {}, {}: give finite numbers", translation_mm.x,
                                           translation_mm.y, theta_rad));
   }
-  BoundedBelief& belief = posterior.belief;
   const KnownElements& elements = belief.elements();
   if (!belief.options().touch_sd.none()) {
     const std::int64_t bin = lattice().bin_of(T_object_robot);
@@ -289,34 +278,33 @@ double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) 
   return sum;
 }
 
-double BoundedPosterior::entropy() const { return with_touches_taken_in().belief.bins().entropy(); }
+double BoundedPosterior::entropy() const { return with_touches_taken_in().bins().entropy(); }
 
 std::vector<PoseSample> BoundedPosterior::sample(std::size_t count, std::uint64_t seed) const {
-  return with_touches_taken_in().belief.bins().sample(count, seed);
+  return with_touches_taken_in().bins().sample(count, seed);
 }
 
 std::vector<TouchGain> BoundedPosterior::expected_gain(std::span<const Pose> T_robot_sensor,
                                                        std::span<const glm::dvec2> elements_mm,
                                                        const PlanOptions& plan) const {
-  Impl& posterior = with_touches_taken_in();
-  BoundedBelief& belief = posterior.belief;
-  require_plan(T_robot_sensor, elements_mm, plan, posterior.bodies.size());
-  if (!posterior.predicted) {
-    posterior.predicted.emplace(belief.hypotheses(), belief.options().contact);
+  Impl& belief = with_touches_taken_in();
+  require_plan(T_robot_sensor, elements_mm, plan, belief.hypotheses().size());
+  if (!belief.predicted) {
+    belief.predicted.emplace(belief.hypotheses(), belief.options().contact);
   }
   const std::vector<PoseSample> samples = belief.bins().sample(plan.samples, plan.seed);
-  return palpate::expected_gain(*posterior.predicted, samples, T_robot_sensor, elements_mm,
+  return palpate::expected_gain(*belief.predicted, samples, T_robot_sensor, elements_mm,
                                 belief.options().touch_sd, plan);
 }
 
 std::vector<PoseBlock> BoundedPosterior::refined_blocks() const {
-  return with_touches_taken_in().belief.refined_blocks();
+  return with_touches_taken_in().refined_blocks();
 }
 
-const PoseLattice& BoundedPosterior::lattice() const { return impl().belief.options().lattice; }
+const PoseLattice& BoundedPosterior::lattice() const { return impl().options().lattice; }
 
-std::string BoundedPosterior::path() const { return impl().belief.path(); }
+std::string BoundedPosterior::path() const { return impl().path(); }
 
-std::uint64_t BoundedPosterior::host_bytes() const { return impl().belief.bytes(); }
+std::uint64_t BoundedPosterior::host_bytes() const { return impl().bytes(); }
 
 }  // namespace palpate

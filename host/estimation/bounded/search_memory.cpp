@@ -3,19 +3,18 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
+#include <cstddef>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "estimation/bounded/displaced/undisplaced_bins.hpp"
 #include "estimation/bounded/leaves/bin_kernel.hpp"
 #include "estimation/bounded/search/leaves.hpp"
+#include "estimation/bounded/search/search_space.hpp"
 #include "estimation/bounded/tables/tile_bounds.hpp"
 #include "estimation/bounded/tables/window_table.hpp"
-#include "estimation/displacement_weights.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -26,17 +25,11 @@ constexpr double most_family_bins = 1e7;
 /// Bins of all objects that 64 bits number, with room for sums.
 constexpr double most_bins = 4e18;
 
-/// Tiles along an axis, as tile_levels() counts them.
-double tiles_along(const Axis& axis, const TileSize& size, double side_mm) {
-  const double batches =
-      size.bins > 0 ? std::ceil(static_cast<double>(axis.count) / (batch_side * size.bins))
-                    : std::floor(axis.step() * (axis.count - 1) / (batch_side * side_mm)) + 1.0;
-  return batch_side * batches;
-}
-
-/// Most bins along an axis within this many mm.
-double bins_within(const Axis& axis, double side_mm) {
-  const double bins = axis.count > 1 ? std::floor(side_mm / axis.step()) + 1.0 : 1.0;
+/// Most bins along an axis within a batch of tiles.
+double bins_in_batch(const Axis& axis, const TileSize& size, double cell_mm) {
+  const double bins = size.bins > 0
+                          ? batch_side * size.bins
+                          : std::floor(batch_side * size.cells() * cell_mm / axis.step()) + 1.0;
   return std::min<double>(bins, axis.count);
 }
 
@@ -55,8 +48,8 @@ double node_bytes(const OccupancyGrid& map) {
   return (map.nx + border) * (map.ny + border) * MapPatches::side * sizeof(float);
 }
 
-double bins_in_all(std::span<const Hypothesis> hypotheses, const PoseLattice& lattice) {
-  return static_cast<double>(hypotheses.size()) * lattice.x_mm.count * lattice.y_mm.count *
+double bins_in_all(std::size_t objects, const PoseLattice& lattice) {
+  return static_cast<double>(objects) * lattice.x_mm.count * lattice.y_mm.count *
          lattice.theta_rad.count;
 }
 
@@ -65,61 +58,38 @@ double bins_in_all(std::span<const Hypothesis> hypotheses, const PoseLattice& la
 SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const BoundedOptions& options) {
   const PoseLattice& lattice = options.lattice;
   const double thetas = lattice.theta_rad.count;
-  const std::size_t readings =
-      options.contact.table ? options.contact.table->levels() : std::size_t{2};
-  double least_cell_mm = std::numeric_limits<double>::infinity();
-  for (const Hypothesis& hypothesis : hypotheses) {
-    least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
-  }
-  const std::vector<TileSize> sizes =
-      tile_sizes(lattice, least_cell_mm, hypotheses.size(), options.touch_sd);
-  SearchMemory memory;
+  const std::size_t readings = options.contact.table ? options.contact.table->levels() : 2;
+  const std::vector<TileSize> sizes = tile_sizes(hypotheses, options);
+  // Of every object and theta, the tiles that see the map and the best of them; and what the mean
+  // of a touch keeps.
+  const double plane_bytes = sizeof(TileRange) + sizeof(Tile) + (options.none_weight ? 128.0 : 0.0);
+  SearchMemory memory{.tiles = thetas * sizeof(glm::dvec2)};  // cosines and sines
   for (const Hypothesis& hypothesis : hypotheses) {
     const OccupancyGrid& map = hypothesis.compared();
     memory.tables += node_bytes(map);
-    const auto along = [&](const TileSize& size) {
-      const double side_mm = size.cells() * map.cell_mm;
-      return glm::dvec2(tiles_along(lattice.x_mm, size, side_mm),
-                        tiles_along(lattice.y_mm, size, side_mm));
-    };
     for (const TileSize& size : sizes) {
-      memory.tables += static_cast<double>(readings) *
-                       table_bytes(map, size, square_mm(size, lattice, map.cell_mm));
-      memory.tiles += sizeof(int) * (along(size).x + along(size).y);
+      const glm::dvec2 square = square_mm(size, lattice, map.cell_mm);
+      const double x_tiles = batch_side * batches_along(lattice.x_mm, size, size.side * square.x);
+      const double y_tiles = batch_side * batches_along(lattice.y_mm, size, size.side * square.y);
+      memory.tables += static_cast<double>(readings) * table_bytes(map, size, square);
+      memory.tiles += sizeof(int) * (x_tiles + y_tiles);
+      if (&size == &sizes.front()) {
+        constexpr double tile_bytes = sizeof(std::int32_t) + sizeof(Tile);  // its sum, its place
+        memory.tiles += thetas * (x_tiles * y_tiles * tile_bytes + plane_bytes);
+      }
     }
-    const double largest_tiles = thetas * along(sizes.front()).x * along(sizes.front()).y;
-    memory.tiles += (sizeof(std::int32_t) + sizeof(Tile)) * largest_tiles;
-    const TileSize& smallest = sizes.back();
-    const double family_mm = batch_side * smallest.cells() * map.cell_mm;
-    const auto in_family = [&](const Axis& axis) {
-      return smallest.bins > 0 ? std::min<double>(axis.count, batch_side * smallest.bins)
-                               : bins_within(axis, family_mm);
-    };
     memory.largest_family =
-        std::max(memory.largest_family, in_family(lattice.x_mm) * in_family(lattice.y_mm));
+        std::max(memory.largest_family, bins_in_batch(lattice.x_mm, sizes.back(), map.cell_mm) *
+                                            bins_in_batch(lattice.y_mm, sizes.back(), map.cell_mm));
   }
-  // A cosine and a sine; and of every object the tiles that see the map, and the best of them.
-  memory.thetas = thetas * (sizeof(glm::dvec2) + static_cast<double>(hypotheses.size()) *
-                                                     (sizeof(TileRange) + sizeof(Tile)));
-  if (options.none_weight) {
-    // What the mean of a touch keeps of every plane.
-    constexpr double plane_bytes = 128.0;
-    memory.thetas += thetas * static_cast<double>(hypotheses.size()) * plane_bytes;
-    if (!options.touch_sd.none()) {
-      // And of every theta, the places to which turns move its bins.
-      const int steps = DisplacementWeights(lattice, options.touch_sd).theta_steps();
-      memory.thetas += thetas * (2.0 * steps + 1.0) * 2.0 * sizeof(Tap);
-    }
-  }
-  // The last family of a batch may exceed the batch by all of its bins.
-  // Each bin's value as it is evaluated and kept.
-  constexpr double bytes_per_bin = 2 * sizeof(double);
-  memory.leaves =
-      bytes_per_bin * std::min(static_cast<double>(largest_batch) + memory.largest_family,
-                               bins_in_all(hypotheses, lattice));
+  // The last family of a batch may exceed the batch by all of its bins. Each bin's value stands
+  // there as it is evaluated and as it is kept.
+  memory.bins = 2.0 * sizeof(double) *
+                std::min(static_cast<double>(largest_batch) + memory.largest_family,
+                         bins_in_all(hypotheses.size(), lattice));
   if (!options.touch_sd.none()) {
     // Every plane's mean, and its neighbours' sums; and of all bins, what is kept of them.
-    memory.means = 2.0 * sizeof(double) * bins_in_all(hypotheses.first(1), lattice) +
+    memory.bins += 2.0 * sizeof(double) * bins_in_all(1, lattice) +
                    static_cast<double>(UndisplacedBins::most_bytes);
   }
   return memory;
@@ -131,7 +101,7 @@ std::string why_no_room(std::span<const Hypothesis> hypotheses, const BoundedOpt
   const std::string what =
       fmt::format("lattice: bounds of {} objects x {} x {} x {} bins", hypotheses.size(),
                   lattice.x_mm.count, lattice.y_mm.count, lattice.theta_rad.count);
-  if (bins_in_all(hypotheses, lattice) > most_bins) {
+  if (bins_in_all(hypotheses.size(), lattice) > most_bins) {
     return fmt::format("{} are too many to number; use fewer bins", what);
   }
   const SearchMemory memory = search_memory(hypotheses, options);
@@ -144,23 +114,15 @@ std::string why_no_room(std::span<const Hypothesis> hypotheses, const BoundedOpt
   if (memory.total() <= static_cast<double>(limit_bytes)) {
     return "";
   }
-  struct Part {
-    double bytes;
-    const char* remedy;
-  };
-  const std::array<Part, 5> parts{
-      {{memory.tables, "use fewer maps, maps of fewer cells, or a narrower region"},
-       {memory.tiles, "use fewer thetas or maps, or narrow the region"},
-       {memory.thetas, "use fewer thetas or maps"},
-       {memory.leaves, "use fewer bins along x and y"},
-       {memory.means, "use fewer bins"}}};
-  const Part& largest = *std::max_element(
-      parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.bytes < b.bytes; });
+  const char* const remedy = memory.tables >= std::max(memory.tiles, memory.bins)
+                                 ? "use fewer maps, maps of fewer cells, or a narrower region"
+                             : memory.tiles >= memory.bins
+                                 ? "use fewer thetas or maps, or narrow the region"
+                                 : "use fewer bins";
   constexpr double mib = 1 << 20;
   return fmt::format(
       "{} need {:.0f} MiB of the host's memory, a quarter of which are {:.0f} MiB; {}", what,
-      std::ceil(memory.total() / mib), std::floor(static_cast<double>(limit_bytes) / mib),
-      largest.remedy);
+      std::ceil(memory.total() / mib), std::floor(static_cast<double>(limit_bytes) / mib), remedy);
 }
 
 std::uint64_t memory_for_search() {

@@ -12,13 +12,11 @@ namespace palpate {
 /// integer.
 struct SearchMemory {
   double tables = 0.0;  ///< of the maps: penalties of windows, nodes
-  double tiles = 0.0;   ///< the largest tiles: their sums, and their places in a search
-  double thetas = 0.0;  ///< what every theta of the lattice has
-  double leaves = 0.0;  ///< bins that are evaluated together
-  double means = 0.0;   ///< displaced touches: all bins of one object within reach of some bins
+  double tiles = 0.0;   ///< of every theta: the largest tiles, their sums and places in a search
+  double bins = 0.0;    ///< that are evaluated together, with what displaced touches keep of theirs
 
   double largest_family = 0.0;  ///< bins that the smallest tiles of one larger tile hold
-  double total() const { return tables + tiles + thetas + leaves + means; }
+  double total() const { return tables + tiles + bins; }
 };
 
 /// Allocates nothing. What the search takes while it divides tiles is not foreseen.

@@ -18,8 +18,8 @@ PALPATE_API bool is_virtual_sensor(std::string_view name);
 /// @throws Error (Fault::input) on an unknown option
 PALPATE_API std::optional<std::filesystem::path> virtual_sensor_file(const std::string& name);
 
-/// True for a simulation without end that gives more than 10 MB of frames a second: a recording of
-/// it needs a limit.
+/// True for a simulation without end that gives frames as fast as they are taken: a recording of it
+/// needs a limit.
 /// @throws Error (Fault::input) on an unknown or wrong option
 PALPATE_API bool is_endless_flood(const std::string& name);
 

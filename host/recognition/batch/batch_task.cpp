@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <tuple>
 #include <utility>
 
 #include <fmt/ranges.h>
@@ -12,7 +13,6 @@
 #include "io/atomic_file.hpp"
 #include "io/input_file.hpp"
 #include "options/option.hpp"
-#include "options/refused_option.hpp"
 
 namespace palpate {
 
@@ -85,9 +85,10 @@ BatchTask head_of(const OrderedJson& json) {
   return task;
 }
 
-/// What two tasks' requests may differ in, as texts.
+/// What two tasks may be asked differently, as texts.
 std::map<std::string, std::string> asked_of(const BatchTask& task) {
   std::map<std::string, std::string> texts = option_texts(task.request);
+  texts["chunk"] = fmt::format("{}", task.chunk_unknowns);
   if (!task.request.maps.empty()) {
     texts["maps"] = fmt::format("{}", fmt::join(task.request.maps, " "));
   }
@@ -134,7 +135,7 @@ void require_countable(const fs::path& file, const BatchTask& task) {
     const std::size_t unknowns = task.unknowns_of(entry);
     if (unknowns > left) {
       refuse(file, "has more than {} unknowns at {}; give fewer recordings, or another folder",
-             most_unknowns, entry.input.path);
+             most_unknowns, entry.path);
     }
     left -= unknowns;
   }
@@ -202,12 +203,12 @@ std::string head_text(const BatchTask& task) {
 BatchTask head_from(std::string_view text) { return head_of(OrderedJson::parse(text)); }
 
 std::string entry_text(const BatchEntry& entry) {
-  OrderedJson json{{"path", to_utf8(entry.input.path)}};
-  if (entry.input.frames) {
-    json["frames"] = OrderedJson::array({entry.input.frames->begin, entry.input.frames->end});
+  OrderedJson json{{"path", to_utf8(entry.path)}};
+  if (entry.frames) {
+    json["frames"] = OrderedJson::array({entry.frames->begin, entry.frames->end});
   }
-  if (!entry.input.label.empty()) {
-    json["label"] = to_utf8(entry.input.label);
+  if (!entry.label.empty()) {
+    json["label"] = to_utf8(entry.label);
   }
   if (entry.stamp) {
     json["bytes"] = entry.stamp->bytes;
@@ -222,12 +223,11 @@ std::string entry_text(const BatchEntry& entry) {
 BatchEntry entry_from(std::string_view text) {
   const OrderedJson json = OrderedJson::parse(text);
   BatchEntry entry;
-  entry.input.path = from_utf8(json.at("path"));
+  entry.path = from_utf8(json.at("path"));
   if (json.contains("frames")) {
-    entry.input.frames =
-        Frames{count_of(json.at("frames").at(0)), count_of(json.at("frames").at(1))};
+    entry.frames = Frames{count_of(json.at("frames").at(0)), count_of(json.at("frames").at(1))};
   }
-  entry.input.label = from_utf8(json.value("label", ""));
+  entry.label = from_utf8(json.value("label", ""));
   if (json.contains("bytes")) {
     entry.stamp = FileStamp{count_of(json.at("bytes")), json.at("modified_ns")};
   }
@@ -283,10 +283,6 @@ std::string difference_of_tasks(const BatchTask& before, const BatchTask& now) {
     return fmt::format("`{}` is {}, its results are of {}", *option, value_of(asked, *option),
                        value_of(old, *option));
   }
-  if (before.chunk_unknowns != now.chunk_unknowns) {
-    return fmt::format("chunks of {} unknowns are asked for, its results have {}",
-                       now.chunk_unknowns, before.chunk_unknowns);
-  }
   if (const auto file = first_difference(before.files, now.files)) {
     return fmt::format("{} {}", *file,
                        !now.files.contains(*file)      ? "is no longer used"
@@ -301,16 +297,13 @@ std::string difference_of_inputs(const BatchTask& before, const BatchTask& now) 
   for (std::size_t i = 0; i < both; ++i) {
     const BatchEntry& old = before.inputs[i];
     const BatchEntry& entry = now.inputs[i];
-    if (!(old.input == entry.input)) {
-      return fmt::format("input {} is {}, its results are of {}{}", i, entry.input.path,
-                         old.input.path,
-                         old.input.path == entry.input.path ? " with other frames or label" : "");
+    if (std::tie(old.path, old.frames, old.label) !=
+        std::tie(entry.path, entry.frames, entry.label)) {
+      return fmt::format("input {} is {}, its results are of {}{}", i, entry.path, old.path,
+                         old.path == entry.path ? " with other frames or label" : "");
     }
     if (old.stamp != entry.stamp) {
-      return fmt::format("{} {}", entry.input.path,
-                         !entry.stamp ? "is gone"
-                         : !old.stamp ? "is new"
-                                      : "has changed");
+      return entry.path + (entry.stamp ? " has changed" : " is gone");
     }
   }
   return before.inputs.size() == now.inputs.size()

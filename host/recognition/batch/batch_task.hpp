@@ -17,15 +17,6 @@
 
 namespace palpate {
 
-/// A recording of a batch, as its manifest or the caller names it.
-struct BatchInput {
-  std::string path;
-  std::optional<Frames> frames;  ///< of the manifest; none: as the request says
-  std::string label;             ///< of the manifest: the true label; "": the recording's own
-
-  friend bool operator==(const BatchInput&, const BatchInput&) = default;
-};
-
 /// Size and time of modification, by which a changed file is noticed.
 struct FileStamp {
   std::uintmax_t bytes = 0;
@@ -43,10 +34,13 @@ struct InputSurvey {
   std::string pressure_unit;  ///< "" where it cannot be read
 };
 
+/// A recording of a batch, as its manifest or the caller names it.
 struct BatchEntry {
-  BatchInput input;
-  std::optional<FileStamp> stamp;
-  std::optional<InputSurvey> survey;  ///< only where the task needs it
+  std::string path;
+  std::optional<Frames> frames = {};  ///< of the manifest; none: as the request says
+  std::string label = {};             ///< of the manifest: the true label; "": the recording's own
+  std::optional<FileStamp> stamp = {};
+  std::optional<InputSurvey> survey = {};  ///< only where the task needs it
 };
 
 /// What a results folder computes: the content of its task file, in whose absence nothing is

@@ -8,8 +8,6 @@
 #include <system_error>
 #include <thread>
 
-#include <tbb/global_control.h>
-#include <tbb/info.h>
 #include <tbb/task_arena.h>
 
 #include "estimation/parallel_for.hpp"
@@ -46,7 +44,7 @@ void read_manifest(const fs::path& manifest, std::vector<BatchEntry>& inputs) {
   const std::optional<std::size_t> frames = table.find("frames");
   const std::optional<std::size_t> label = table.find("label");
   while (table.next()) {
-    BatchInput input;
+    BatchEntry input;
     if (table.text(*path).empty()) {
       table.refuse("column 'path' is empty; name a recording");
     }
@@ -61,29 +59,19 @@ void read_manifest(const fs::path& manifest, std::vector<BatchEntry>& inputs) {
     if (label) {
       input.label = table.text(*label);
     }
-    inputs.push_back({std::move(input), {}, {}});
+    inputs.push_back(std::move(input));
   }
 }
 
 void read_folder(const fs::path& folder, std::vector<BatchEntry>& inputs) {
-  std::error_code error;
-  const fs::directory_iterator entries(folder, error);
-  if (error) {
-    refuse(folder, "cannot be read: {}; check its permissions", error.message());
-  }
-  std::vector<std::string> paths;
-  for (const auto& entry : entries) {
-    const fs::path& path = entry.path();
+  const std::size_t before = inputs.size();
+  for (const fs::path& path : paths_in(folder)) {
     if (path.extension() == ".h5" && path.stem().extension() != ".map") {
-      paths.push_back(path.string());
+      inputs.push_back({.path = path.string()});
     }
   }
-  if (paths.empty()) {
+  if (inputs.size() == before) {
     refuse(folder, "a folder without recordings (*.h5); give another one");
-  }
-  std::ranges::sort(paths);
-  for (std::string& path : paths) {
-    inputs.push_back({.input = {.path = std::move(path)}});
   }
 }
 
@@ -96,14 +84,14 @@ void read_pattern(const std::string& pattern, std::vector<BatchEntry>& inputs) {
     refuse(pattern, "no file matches; give recordings, a folder of them or a manifest");
   }
   for (std::size_t i = 0; i < found.gl_pathc; ++i) {
-    inputs.push_back({.input = {.path = found.gl_pathv[i]}});
+    inputs.push_back({.path = found.gl_pathv[i]});
   }
   ::globfree(&found);
 }
 
 /// @param inferred whose pressure unit the recording must have; none: any unit will do
 /// @throws Error (Fault::input) where the recording is at fault
-ReadInput read_input(const BatchInput& input, const Request& request,
+ReadInput read_input(const BatchEntry& input, const Request& request,
                      const Circumstances* inferred) {
   const auto recording = std::make_shared<Recording>(read_recording(input.path));
   Recording like = inferred == nullptr ? Recording{} : Recording{.path = inferred->source};
@@ -122,7 +110,7 @@ ReadInput read_input(const BatchInput& input, const Request& request,
 
 InputSurvey survey_of(const BatchEntry& entry, const Request& request) {
   try {
-    const ReadInput read = read_input(entry.input, request, nullptr);
+    const ReadInput read = read_input(entry, request, nullptr);
     InputSurvey survey{.touches = 0,
                        .reach_mm = largest_reach_mm(std::span(read.recording.get(), 1)),
                        .pressure_unit = read.recording->pressure_unit};
@@ -141,7 +129,7 @@ InputSurvey survey_of(const BatchEntry& entry, const Request& request) {
 constexpr const char* begin_again = "begin again, in another folder";
 
 /// Unknowns that have the error of their recording.
-ReadInput broken_input(const BatchInput& input, std::size_t count, const Request& request,
+ReadInput broken_input(const BatchEntry& input, std::size_t count, const Request& request,
                        const std::string& error) {
   const Query unknown{.recording = input.path,
                       .frame = {},
@@ -169,40 +157,39 @@ std::vector<BatchEntry> list_inputs(std::span<const std::string> arguments) {
     } else if (argument.find_first_of("*?[") != argument.npos && !fs::exists(argument, ignored)) {
       read_pattern(argument, inputs);
     } else {
-      inputs.push_back({.input = {.path = argument}});
+      inputs.push_back({.path = argument});
     }
   }
   if (inputs.empty()) {
     refuse(arguments.front(), "names no recording; write a row for each");
   }
   for (BatchEntry& entry : inputs) {
-    entry.stamp = stamp_of(entry.input.path);
+    entry.stamp = stamp_of(entry.path);
   }
   return inputs;
 }
 
 ReadInput read_entry(const BatchTask& task, const BatchEntry& entry, const Request& request) {
-  const BatchInput& input = entry.input;
   const std::size_t count = task.unknowns_of(entry);
   const auto require_unchanged = [&] {
-    if (stamp_of(input.path) != entry.stamp) {
-      refuse(input.path, "has changed since the batch began; {}", begin_again);
+    if (stamp_of(entry.path) != entry.stamp) {
+      refuse(entry.path, "has changed since the batch began; {}", begin_again);
     }
   };
   require_unchanged();
   ReadInput read;
   try {
-    read = read_input(input, request, &task.inferred);
+    read = read_input(entry, request, &task.inferred);
   } catch (const Error& error) {
     require_unchanged();
     if (error.fault() != Fault::input) {
       throw;
     }
-    return broken_input(input, count, request, error.what());
+    return broken_input(entry, count, request, error.what());
   }
   require_unchanged();
   if (read.unknowns.size() != count) {
-    refuse(input.path, "has {} unknowns, but had {} when the batch began; {}", read.unknowns.size(),
+    refuse(entry.path, "has {} unknowns, but had {} when the batch began; {}", read.unknowns.size(),
            count, begin_again);
   }
   return read;
@@ -213,29 +200,15 @@ void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::si
   if (!request.each_frame && !infers_region(request)) {
     return;
   }
-  std::vector<BatchEntry*> missing;
-  for (BatchEntry& entry : inputs) {
-    if (!entry.survey) {
-      missing.push_back(&entry);
-    }
-  }
-  if (missing.empty()) {
-    return;
-  }
-  threads = std::clamp<std::size_t>(threads, 1, missing.size());
   std::atomic<std::size_t> done = 0;
   const auto caller = std::this_thread::get_id();
-  // Readers wait for disks: there may be more of them than processors.
-  const tbb::global_control allowed(
-      tbb::global_control::max_allowed_parallelism,
-      std::max(threads, static_cast<std::size_t>(tbb::info::default_concurrency())));
-  tbb::task_arena arena(static_cast<int>(threads));
+  tbb::task_arena arena(static_cast<int>(std::clamp<std::size_t>(threads, 1, inputs.size())));
   arena.execute([&] {
-    parallel_for(missing.size(), [&](std::size_t i) {
-      missing[i]->survey = survey_of(*missing[i], request);
+    parallel_for(inputs.size(), [&](std::size_t i) {
+      inputs[i].survey = survey_of(inputs[i], request);
       ++done;
       if (std::this_thread::get_id() == caller) {
-        progress(static_cast<double>(done) / static_cast<double>(missing.size()));
+        progress(static_cast<double>(done) / static_cast<double>(inputs.size()));
       }
     });
   });
@@ -249,7 +222,7 @@ Circumstances infer(std::span<const BatchEntry> inputs, const Request& request) 
   for (const BatchEntry& entry : inputs) {
     if (const InputSurvey survey = surveyed(entry); !survey.pressure_unit.empty()) {
       inferred.pressure_unit = survey.pressure_unit;
-      inferred.source = entry.input.path;
+      inferred.source = entry.path;
       break;
     }
   }

@@ -31,9 +31,8 @@ struct ReadInput {
 /// @throws Error where the file is not as it was when the task was settled, or the machine fails
 ReadInput read_entry(const BatchTask& task, const BatchEntry& entry, const Request& request);
 
-/// Reads the inputs that lack a survey, where the request needs surveys, on so many threads; one
-/// that cannot be read counts as one unknown without arrays. `progress` is called now and then by
-/// the calling thread.
+/// Surveys the inputs, where the request needs surveys, on so many threads; one that cannot be read
+/// counts as one unknown without arrays. `progress` is called now and then by the calling thread.
 void survey_inputs(std::span<BatchEntry> inputs, const Request& request, std::size_t threads,
                    const std::function<void(double)>& progress);
 

@@ -26,13 +26,6 @@ Axis random_axis(Uniform& random, double cell_mm, double middle_mm) {
   return {lower, lower + count * step_mm, count};
 }
 
-LikelihoodTable table_of_two() {
-  LikelihoodTable table = crooked_table();
-  const std::vector<double> first = table.log_likelihood;
-  table.log_likelihood.insert(table.log_likelihood.end(), first.rbegin(), first.rend());
-  return table;
-}
-
 /// One of the kinds of maps that bounds must hold on: a letter; noise of log odds within +-12 or
 /// +-1000; few cells; cells of 0.02 and 100 mm; one cell.
 OccupancyGrid random_bound_map(Uniform& random) {
@@ -89,6 +82,13 @@ LikelihoodTable crooked_table() {
   return table;
 }
 
+LikelihoodTable crooked_table_of_two() {
+  LikelihoodTable table = crooked_table();
+  const std::vector<double> first = table.log_likelihood;
+  table.log_likelihood.insert(table.log_likelihood.end(), first.rbegin(), first.rend());
+  return table;
+}
+
 std::vector<double> by_definition(const BinCase& of, const std::vector<BinBox>& boxes) {
   std::vector<double> logs;
   for (const BinBox& box : boxes) {
@@ -115,7 +115,7 @@ BinCase random_bound_case(Uniform& random) {
   of.contact.gamma = one_of(random, std::array{0.0, 0.1});
   of.contact.prior = one_of(random, std::array{0.2, 0.5, 1e-6});
   if (random(0.0, 4.0) < 1.0) {
-    of.contact.table = table_of_two();
+    of.contact.table = crooked_table_of_two();
   }
   const auto near_the_map = [&] { return cell_mm * random(-12.0, 12.0); };
   of.lattice.x_mm = random_axis(random, cell_mm, near_the_map());

@@ -38,6 +38,8 @@ KnownElements random_elements(std::size_t count, double half_mm, std::size_t lev
 
 /// A table of four levels that is not monotone, the last level steeper than any map.
 LikelihoodTable crooked_table();
+/// That of two objects: the second one's numbers are the first one's, backwards.
+LikelihoodTable crooked_table_of_two();
 
 /// Log-likelihood of the elements at every bin of the boxes, in nats, from the reference. The pivot
 /// is the robot's origin.

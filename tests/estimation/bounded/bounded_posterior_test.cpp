@@ -23,26 +23,6 @@ TEST(BoundedPosterior, SaysHowItSearches) {
   EXPECT_EQ(posterior.lattice().bins(), small_options().lattice.bins());
 }
 
-TEST(BoundedPosterior, TellsMarginalsOnAnyGrid) {
-  BoundedPosterior posterior(two_shapes(), small_options());
-  posterior.update(all_touches(touches_of_l(2, 806)));
-  PoseLattice grid = small_options().lattice;
-  grid.y_mm.count = 1;
-  grid.theta_rad.count = 4;  // four in the place of one
-  const Marginals own = posterior.marginals(1);
-  const Marginals marginals = posterior.marginals(1, grid);
-  EXPECT_EQ(marginals.grid.y_mm.count, 1);
-  ASSERT_EQ(marginals.theta.size(), 4U);
-  for (std::size_t t = 0; t < 4; ++t) {
-    EXPECT_NEAR(marginals.theta[t], sum(std::span(own.theta).subspan(4 * t, 4)), 1e-12);
-  }
-  std::vector<double> x(13);
-  for (std::size_t i = 0; i < own.xy.size(); ++i) {
-    x[i % 13] += own.xy[i];
-  }
-  EXPECT_LE(largest_difference(marginals.xy, x), 1e-12);
-}
-
 /// Elements in contact where all cells of a map have the same log odds.
 struct Contradiction {
   int side = 0;           ///< of the square of elements

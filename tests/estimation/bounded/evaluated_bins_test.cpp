@@ -1,8 +1,6 @@
 // The bins that a search evaluated: how they are kept, searched for again where there are too many,
 // and told, against every bin.
 
-#include "estimation/bounded/evaluated_bins.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -14,56 +12,12 @@
 #include <gtest/gtest.h>
 
 #include "bound_cases.hpp"
+#include "estimation/bounded/leaves/bin_likelihood.hpp"
+#include "estimation/known_elements.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "support/certified.hpp"
 
 namespace palpate::evaluated_bins_test {
-
-/// Objects, thetas and bins of the boxes, and their values.
-std::vector<std::pair<std::vector<std::int64_t>, std::vector<double>>> visited(
-    const EvaluatedBins& bins) {
-  std::vector<std::pair<std::vector<std::int64_t>, std::vector<double>>> kept;
-  bins.visit([&](const BinBox& box, std::span<const double> values) {
-    kept.push_back({{box.object, box.theta, box.bins()}, {values.begin(), values.end()}});
-  });
-  return kept;
-}
-
-TEST(EvaluatedBins, AreVisitedInTheOrderInWhichTheyCame) {
-  EvaluatedBins bins;
-  EXPECT_TRUE(visited(bins).empty());
-  auto added = visited(bins);
-  for (int i = 0; i < 50; ++i) {
-    const BinBox box{.object = i, .theta = 2 * i, .y_count = i % 5 + 1, .x_count = 3};
-    // One number stands for all bins of some boxes.
-    std::vector<double> values(i % 3 == 0 ? 1 : static_cast<std::size_t>(box.bins()));
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      values[k] = -i - 0.01 * static_cast<double>(k);
-    }
-    bins.add(box, values);
-    added.push_back({{box.object, box.theta, box.bins()}, values});
-  }
-  EXPECT_TRUE(bins.complete());
-  EXPECT_EQ(visited(bins), added);
-}
-
-TEST(EvaluatedBins, AreGivenUpBeyondTheirMemory) {
-  EvaluatedBins bins;
-  const std::vector<double> values(1'000'000, -1.0);
-  const BinBox box{.y_count = 1000, .x_count = 1000};
-  // 80 MiB hold ten times 8 MB.
-  for (int i = 0; i < 10; ++i) {
-    bins.add(box, values);
-    ASSERT_TRUE(bins.complete()) << i;
-    ASSERT_LE(bins.bytes(), std::uint64_t{160} << 20);
-  }
-  bins.add(box, values);
-  EXPECT_FALSE(bins.complete());
-  EXPECT_EQ(bins.bytes(), 0U);
-  bins.add({.y_count = 1, .x_count = 1}, std::span(values).first(1));
-  EXPECT_FALSE(bins.complete()) << "some are missing, however few came last";
-  EXPECT_TRUE(visited(bins).empty());
-}
 
 TEST(EvaluatedBins, BeyondTheirMemoryAreSearchedForAgain) {
   // 12 million bins, nearly all of which matter after one touch of three elements.

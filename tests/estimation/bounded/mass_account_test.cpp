@@ -241,31 +241,6 @@ TEST(UnsettledMass, PutsBoundsAboveTheLargestIntoTheFirstSlot) {
   }
 }
 
-TEST(LogSum, IsTheLogOfTheSumInAnyOrder) {
-  Uniform random(303);
-  for (const double range : {1e-3, 1.0, 100.0, 5000.0}) {
-    std::vector<double> logs;
-    for (int i = 0; i < 300; ++i) {
-      logs.push_back(-4000.0 + random(0.0, range));
-    }
-    const double expected = log_of_sum(logs);
-    const auto expect_sum = [&] {
-      LogSum sum;
-      for (const double log : logs) {
-        sum.add(log);
-        sum.add(-infinity);
-      }
-      // 300 roundings of a sum, and that of a log of some thousand nats.
-      EXPECT_NEAR(sum.log(), expected, 1e-11);
-    };
-    expect_sum();
-    std::ranges::sort(logs);
-    expect_sum();
-    std::ranges::reverse(logs);
-    expect_sum();
-  }
-}
-
 TEST(LogSum, AddsAndSubtractsLogsAndNothing) {
   LogSum sum;
   EXPECT_EQ(sum.log(), -infinity);

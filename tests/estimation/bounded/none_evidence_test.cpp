@@ -16,8 +16,8 @@
 #include "estimation/hypotheses.hpp"
 #include "estimation/log_sum.hpp"
 #include "support/limits.hpp"
-#include "support/sanitized.hpp"
 #include "support/synthetic.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::none_evidence_test {
 
@@ -194,22 +194,6 @@ TEST(NoneEvidence, DoesNotDependOnTheOrderButForTheFirstShare) {
   expect_definition(none, touches);
 }
 
-TEST(MeanSearch, FindsTheSameWhereItHasNoRoomForSums) {
-  NoneByBounds none(two_objects(), lattice_of(30, 30, 8));
-  const Recording recording = random_recording(1, 36, 712);
-  const TouchEvidence touch(recording.touch(0), none.options.contact);
-  const KnownElements known = known_elements(touch, none.options);
-  MeanSearch keeping(none.space, none.options, none.likelihood, touch, known, std::size_t{1} << 20);
-  MeanSearch forgetting(none.space, none.options, none.likelihood, touch, known, 0);
-  double least = infinity;
-  for (int search = 0; search < 3; ++search) {
-    const LogInterval kept = keeping.bounds(least, Deadline({})).value();
-    const LogInterval found = forgetting.bounds(least, Deadline({})).value();
-    expect_same(kept, found);
-    least = kept.high - 4.0;
-  }
-}
-
 TEST(NoneEvidence, HoldsItsDefinitionWhereverADeadlineEndsIt) {
   NoneByBounds none(two_objects(), lattice_of(30, 30, 8));
   const Recording recording = random_recording(2, 36, 711);
@@ -279,18 +263,6 @@ TEST(BoundedNone, IsBoundedAsCloselyAsTheEvidenceAndWithin0_3Nats) {
       EXPECT_GE(high, 1.0 / (1.0 + std::exp(log_add(other_low, none.low) - own_high)) - 1e-12);
     }
   }
-}
-
-TEST(BoundedNone, CountsTheMemoryThatItTakes) {
-  const auto bytes_of = [](const BoundedOptions& options) {
-    BoundedPosterior posterior(two_made_up(), options);
-    posterior.update(all_touches(random_recording(3, 36, 823)));
-    posterior.estimate();
-    return posterior.host_bytes();
-  };
-  // Of each touch, every object and theta has at least some numbers.
-  const auto planes = static_cast<std::uint64_t>(2 * small_options().lattice.theta_rad.count);
-  EXPECT_GT(bytes_of(with_none(1.0)), bytes_of(small_options()) + 3 * planes * sizeof(double));
 }
 
 TEST(BoundedNone, ShowsInTheIdentitiesWhereABudgetLeftIt) {

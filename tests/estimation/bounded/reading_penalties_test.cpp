@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "bound_cases.hpp"
-#include "model/interpolated_map.hpp"
+#include "model/map_likelihood.hpp"
 #include "support/limits.hpp"
 #include "support/synthetic.hpp"
 
@@ -137,9 +137,7 @@ TEST_P(PartsOfCells, HaveTheirLeastPenaltyByEquationSeven) {
 }
 
 TEST_P(PartsOfCells, HaveTheirLeastPenaltyByATable) {
-  LikelihoodTable table = crooked_table();
-  const std::vector<double> first = table.log_likelihood;
-  table.log_likelihood.insert(table.log_likelihood.end(), first.rbegin(), first.rend());
+  const LikelihoodTable table = crooked_table_of_two();
   for (const double steepness : {0.3, 4.0, 12.0, 1000.0}) {
     for (std::size_t object = 0; object < 2; ++object) {
       for (std::size_t level = 0; level < table.levels(); ++level) {

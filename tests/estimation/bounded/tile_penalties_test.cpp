@@ -100,7 +100,7 @@ TEST(WindowTable, EndsInBatchesThatSeeOnlyThePrior) {
   }
 }
 
-/// Elements over squares of a table, the batches of tiles and the sums before them.
+/// Elements over squares of a table, the batch of tiles and the sums before them.
 struct BatchCase {
   SquarePenalties penalties;
   int side = 1;
@@ -109,7 +109,6 @@ struct BatchCase {
   TilePlace place;
   int first_x = 0;
   int first_y = 0;
-  int batches = 1;
   std::uint32_t before = 0;
 };
 
@@ -134,8 +133,7 @@ BatchCase random_batch(std::size_t elements, int side, std::uint16_t largest, st
 
 /// Sums of the tiles' penalties by definition, [x, y].
 std::vector<std::uint32_t> sums_by_definition(const BatchCase& of) {
-  const int tiles_x = batch_side * of.batches;
-  std::vector<std::uint64_t> sums(static_cast<std::size_t>(tiles_x) * batch_side, of.before);
+  std::vector<std::uint64_t> sums(batch_tiles, of.before);
   const TilePlace& place = of.place;
   for (const glm::dvec2& p : of.elements.from_pivot_mm) {
     // Beyond 2^28 squares all is the prior; no batch here is as far.
@@ -146,7 +144,7 @@ std::vector<std::uint32_t> sums_by_definition(const BatchCase& of) {
         square(place.turn.x * p.x - place.turn.y * p.y + place.corner_mm.x, place.square_mm.x);
     const int y =
         square(place.turn.y * p.x + place.turn.x * p.y + place.corner_mm.y, place.square_mm.y);
-    for (int i = 0; i < tiles_x; ++i) {
+    for (int i = 0; i < batch_side; ++i) {
       for (int j = 0; j < batch_side; ++j) {
         sums[batch_side * i + j] +=
             least_penalty(of.penalties, of.window, x + of.side * (of.first_x + i),
@@ -166,13 +164,10 @@ std::vector<std::uint32_t> summed(const BatchCase& of, const WindowTable& table,
                                   std::size_t split = 0) {
   WindowPlaces placed;
   place_windows(of.elements, of.place, table, placed);
-  std::vector<std::uint32_t> sums(static_cast<std::size_t>(of.batches) * batch_tiles, of.before);
+  std::vector<std::uint32_t> sums(batch_tiles, of.before);
   const std::array<TableRun, 2> runs{
       {{&table, 0, split}, {&table, split, of.elements.from_pivot_mm.size()}}};
-  for (int i = 0; i < of.batches; ++i) {
-    add_penalties(placed, runs, of.first_x + batch_side * i, of.first_y,
-                  sums.data() + std::ptrdiff_t{i} * batch_tiles);
-  }
+  add_penalties(placed, runs, of.first_x, of.first_y, sums.data());
   return sums;
 }
 
@@ -186,24 +181,13 @@ void expect_sums(const BatchCase& of, std::size_t split = 0) {
 }
 
 TEST(TilePenalties, AreTheSumsOfWindowsWithEverySetOfInstructions) {
-  for (std::size_t count = 0; count <= 70; ++count) {
-    for (const int side : {1, 2, 8}) {
-      expect_sums(random_batch(count, side, 900, 93 + 7 * count), count / 3);
-    }
-    BatchCase of_single_bins = random_batch(count, 4, 900, 99 + count);
-    of_single_bins.window = 1;
-    expect_sums(of_single_bins);
-  }
-}
-
-TEST(TilePenalties, OfNeighbouringBatchesAreThoseOfEach) {
-  // Elements of which some see the map from none of the batches, some from one and some from all.
+  // Elements of which some see the map from none of the batch's tiles, and some from all.
   Uniform random(100);
   for (std::uint64_t trial = 0; trial < 300; ++trial) {
     const int side = 1 << static_cast<int>(random(0.0, 4.0));
     const auto elements = static_cast<std::size_t>(random(0.0, 70.0));
     BatchCase of = random_batch(elements, side, trial % 3 == 0 ? 8192 : 900, 1000 + trial);
-    of.batches = static_cast<int>(random(1.0, 9.0));
+    of.window = trial % 5 == 0 ? 1 : side + 1;  // as single bins have it
     of.first_x -= static_cast<int>(random(0.0, 40.0));
     of.first_y -= static_cast<int>(random(0.0, 20.0));
     of.penalties.beyond = static_cast<std::uint16_t>(random(0.0, 901.0));
@@ -216,18 +200,13 @@ TEST(TilePenalties, OfManyElementsNeitherWrapNorExceedTheLargestSum) {
   // 16 bits hold 7 of the largest penalties.
   for (const int side : {1, 8}) {
     for (const std::uint16_t largest : {std::uint16_t{0}, std::uint16_t{1}, largest_penalty}) {
-      for (const int batches : {1, 5}) {
-        BatchCase of = random_batch(1400, side, largest, 96);
-        of.batches = batches;
-        expect_sums(of);
-      }
+      expect_sums(random_batch(1400, side, largest, 96));
     }
   }
   expect_sums(random_batch(300000, 1, 4000, 98));
   BatchCase of = random_batch(300000, 1, largest_penalty, 97);
   std::fill(of.penalties.least.begin(), of.penalties.least.end(), largest_penalty);
-  of.batches = 2;
-  ASSERT_EQ(sums_by_definition(of), std::vector<std::uint32_t>(2 * batch_tiles, largest_sum));
+  ASSERT_EQ(sums_by_definition(of), std::vector<std::uint32_t>(batch_tiles, largest_sum));
   expect_sums(of);
   // Just below it.
   of.elements.from_pivot_mm.resize(largest_sum / largest_penalty - 1);

@@ -71,11 +71,6 @@ function strokeLines(context, ...lines) {
   context.stroke();
 }
 
-/** The largest pressure that has a colour of its own: of a recording's, or five thresholds. */
-function fullScale(state) {
-  return state.setup.largest ?? Math.max(5 * state.setup.threshold, 1e-6);
-}
-
 export function drawArray(state, plane, caption) {
   const { setup, frame } = state;
   if (!setup.elements_mm.length) {
@@ -88,7 +83,8 @@ export function drawArray(state, plane, caption) {
   const { lower, upper } = boundsOf(setup.elements_mm, 0.7 * edge);
   plane.fit(lower, upper);
   const context = plane.begin();
-  const scale = fullScale(state);
+  // The strongest colour: of a recording's pressures, or of five thresholds.
+  const scale = setup.largest ?? Math.max(5 * setup.threshold, 1e-6);
   let dead = 0;
   setup.elements_mm.forEach((element, i) => {
     plane.polygon(square(element, edge));

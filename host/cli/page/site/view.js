@@ -5,7 +5,6 @@ import { element, make } from "./elements.js";
 const columns = ["recording", "touches", "best", "probability", "truth", "error, mm", "fit", "act"];
 const mostRows = 500; // of a table are drawn; the filter finds the others
 const rowsAtOnce = 64; // as the server sends them
-const partsKept = 100; // of a recording: 6,400 rows
 
 async function json(path) {
   const answer = await fetch(path);
@@ -69,13 +68,10 @@ async function scrub(count, first, show) {
 
 async function openRecording({ index, file, state, tell }) {
   Object.assign(state.setup, { ...file, maps: [] });
-  const parts = new Map(); // the one that was looked at last stands last
+  let part = null; // the rows that were asked for last
   const rowAt = async (i) => {
     const first = i - (i % rowsAtOnce);
-    const part = parts.get(first) ?? await json(`file/${index}/rows/${first}`);
-    parts.delete(first);
-    parts.set(first, part);
-    if (parts.size > partsKept) parts.delete(parts.keys().next().value);
+    if (part?.first !== first) part = await json(`file/${index}/rows/${first}`);
     return { pressure: part.pressure[i - first], pose: part.pose[i - first],
              time: part.time && part.time[i - first] - file.begin_s };
   };

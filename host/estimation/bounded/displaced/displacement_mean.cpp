@@ -36,7 +36,7 @@ glm::ivec2 places_of(const Tap& tap, int bins) {
 }
 
 /// The blocks that a tap takes for a run, as far as the region reaches.
-BlockRange blocks_taken(const Tap& tap, const BlockRun& run, const PlaceWeights& weights) {
+BlockRange blocks_taken(const Tap& tap, const BlockRun& run, const DisplacementMean& weights) {
   const glm::ivec2 moved = places_of(tap, weights.bins);
   // One place more: the tap lies between places.
   return {.x_first = std::max(0, floor_quotient(side * run.x + moved.x, side)),
@@ -50,9 +50,6 @@ BlockRange blocks_taken(const Tap& tap, const BlockRun& run, const PlaceWeights&
 /// The least part of a tap's bilinear weights that lies inside the region, for any bin of a place.
 double weight_inside(int place, int bins, const Axis& axis, int moved, double fraction) {
   const int end = std::min((place + 1) * bins, axis.count);
-  if (place * bins + moved >= 0 && end + moved < axis.count) {
-    return (1.0 - fraction) + fraction;  // all bins of most places lie inside
-  }
   // It grows and then falls along the axis: least is that of the first or of the last.
   return std::min(part_inside(axis, place * bins + moved, fraction),
                   part_inside(axis, end - 1 + moved, fraction));
@@ -65,7 +62,7 @@ class TapSum {
   using Value = typename Domain::Value;
 
   TapSum(std::span<const Tap> taps, const std::vector<BlurredPlane<Domain>>& planes,
-         const PlaceWeights& weights)
+         const DisplacementMean& weights)
       : taps_(taps), planes_(planes), weights_(weights) {
     for (const Tap& tap : taps) {
       reference_ = std::max(reference_, planes[tap.theta].reference);
@@ -188,7 +185,7 @@ class TapSum {
 
   std::span<const Tap> taps_;
   const std::vector<BlurredPlane<Domain>>& planes_;  ///< [theta]
-  const PlaceWeights& weights_;
+  const DisplacementMean& weights_;
   double reference_ = -infinity;  ///< of the sums, in nats
   int width_ = 0;                 ///< of a run's rows
   std::vector<Value> factors_;    ///< [tap] of its plane's reference
@@ -200,7 +197,7 @@ class TapSum {
 
 /// @returns nothing where the domain holds a mean too inexactly
 template <typename Domain>
-std::optional<std::vector<double>> average(const PlaceWeights& weights,
+std::optional<std::vector<double>> average(const DisplacementMean& weights,
                                            const glm::dvec2& sensor_from_pivot_mm,
                                            std::span<const BlockRun> targets,
                                            const PlaceSource<typename Domain::Value>& source) {
@@ -255,24 +252,26 @@ std::optional<std::vector<double>> average(const PlaceWeights& weights,
 }
 
 /// Terms of the sums that make up a mean.
-double terms_of(const PlaceWeights& weights) {
+double terms_of(const DisplacementMean& weights) {
   return 2.0 * (weights.x.steps + weights.y.steps) +
          4.0 * (2.0 * weights.touch.theta_steps() + 1.0);
 }
 
 }  // namespace
 
-DisplacementMean::DisplacementMean(const DisplacementWeights& weights, int bins)
-    : weights_{weights, bins, AxisBlur(weights.lattice().x_mm, weights.sd().mm, bins),
-               AxisBlur(weights.lattice().y_mm, weights.sd().mm, bins)} {}
+DisplacementMean::DisplacementMean(const DisplacementWeights& weights, int place_bins)
+    : touch(weights),
+      bins(place_bins),
+      x(weights.lattice().x_mm, weights.sd().mm, place_bins),
+      y(weights.lattice().y_mm, weights.sd().mm, place_bins) {}
 
 std::vector<double> DisplacementMean::bounds(const glm::dvec2& sensor_from_pivot_mm,
                                              std::span<const BlockRun> targets,
                                              const PlaceSource<float>& source) const {
   std::vector<double> found =
-      average<TileLikelihoods>(weights_, sensor_from_pivot_mm, targets, source).value();
+      average<TileLikelihoods>(*this, sensor_from_pivot_mm, targets, source).value();
   // Each term rounds by a few units, and so do exponentials and the logarithm.
-  const double rounding = 1e-3 + 0x1p-22 * terms_of(weights_);
+  const double rounding = 1e-3 + 0x1p-22 * terms_of(*this);
   for (double& log_mean : found) {
     log_mean += rounding;
   }
@@ -282,16 +281,16 @@ std::vector<double> DisplacementMean::bounds(const glm::dvec2& sensor_from_pivot
 std::vector<double> DisplacementMean::means(const glm::dvec2& sensor_from_pivot_mm,
                                             std::span<const BlockRun> targets,
                                             const PlaceSource<double>& source) const {
-  auto found = average<BinLikelihoods>(weights_, sensor_from_pivot_mm, targets, source);
+  auto found = average<BinLikelihoods>(*this, sensor_from_pivot_mm, targets, source);
   return found ? *std::move(found)
-               : average<BinLogs>(weights_, sensor_from_pivot_mm, targets, source).value();
+               : average<BinLogs>(*this, sensor_from_pivot_mm, targets, source).value();
 }
 
 double DisplacementMean::mean_error() const {
   // Weights of three Gaussians: exp(-d^2 / 2), d^2 / 2 at most some 8, rounds by 40 units; then
   // norms, exponentials and the logarithm; and a unit for each term of the sums.
   constexpr double of_weights = 256.0;
-  return (of_weights + 2.0 * terms_of(weights_)) * 0x1p-53;
+  return (of_weights + 2.0 * terms_of(*this)) * 0x1p-53;
 }
 
 }  // namespace palpate

@@ -10,23 +10,13 @@
 
 namespace palpate {
 
-/// The weights of displacements between places.
-struct PlaceWeights {
-  DisplacementWeights touch;
-  int bins;  ///< of a place along each axis
-  AxisBlur x;
-  AxisBlur y;
-};
-
 /// Averages a touch's likelihoods over where its sensor may have been, at the places that are asked
 /// for. Each theta is blurred along y and then along x; then neighbouring thetas are added up at
 /// the places to which the turns move a bin. From upper bounds of the likelihoods of tiles, this
 /// gives upper bounds of the means. Both are logs, [run, block, y, x], in nats; -infinity where a
 /// place holds no bin.
-class DisplacementMean {
- public:
-  /// @param bins of a place along each axis
-  DisplacementMean(const DisplacementWeights& weights, int bins);
+struct DisplacementMean {
+  DisplacementMean(const DisplacementWeights& weights, int place_bins);
 
   /// Bounds for tiles, in float32 arithmetic and rounded up.
   /// @param targets sorted by theta, y, x
@@ -40,8 +30,10 @@ class DisplacementMean {
   /// Bound of the error of means(), in nats, beside the source's own.
   double mean_error() const;
 
- private:
-  PlaceWeights weights_;
+  DisplacementWeights touch;
+  int bins;  ///< of a place along each axis
+  AxisBlur x;
+  AxisBlur y;
 };
 
 }  // namespace palpate

@@ -33,7 +33,6 @@ class UndisplacedBins {
   /// @param runs of one theta
   std::vector<BlockRun> copy(std::size_t object, std::span<const BlockRun> runs,
                              const PlaceRows<double>& to) const {
-    constexpr int side = BlockRun::side;
     std::vector<BlockRun> others;
     for (const BlockRun& run : runs) {
       const Plane& plane = planes_[object * thetas_ + static_cast<std::size_t>(run.theta)];
@@ -53,7 +52,6 @@ class UndisplacedBins {
   /// Keeps bins that copy() did not find, as far as there is room.
   /// @param runs of one theta
   void keep(std::size_t object, std::span<const BlockRun> runs, const PlaceRows<double>& from) {
-    constexpr int side = BlockRun::side;
     for (const BlockRun& run : runs) {
       Plane& plane = planes_[object * thetas_ + static_cast<std::size_t>(run.theta)];
       for (int x = run.x; x < run.x + run.count; ++x) {
@@ -72,6 +70,7 @@ class UndisplacedBins {
   std::size_t bytes() const { return static_cast<std::size_t>(most_ - room_) * block_bytes; }
 
  private:
+  static constexpr int side = BlockRun::side;
   /// The bins of a block, [y, x].
   using Block = std::array<double, BlockRun::places>;
   /// Blocks by y and x.

@@ -43,13 +43,6 @@ class MapPatches {
   std::vector<float> nodes_;
 };
 
-/// Extremes of a table over all readings of one object, in nats.
-struct TableExtent {
-  double largest = 0.0;   ///< magnitude
-  double steepest = 0.0;  ///< difference per nat of log odds
-  double width = 0.0;     ///< from the first node to the last, in nats of log odds
-};
-
 /// How kernels of bins evaluate Eq. 7, or the table in its place. With r = gamma m / s and
 /// s = gamma m + 1 - gamma, the likelihood of contact at log odds z (of no contact at -z) is
 ///
@@ -66,15 +59,11 @@ struct ReadingForm {
   /// @param contact resolved: with its prior
   explicit ReadingForm(const ContactModel& contact);
 
-  /// A table's values of an object's reading, [node]; behind them the differences to the next
-  /// node's value, 0 at the last.
+  /// A table's values of an object's reading, [node].
   const double* values(std::size_t object, Reading reading) const {
     const std::size_t row = (sets == 1 ? 0 : object) * readings + static_cast<std::size_t>(reading);
-    return rows.data() + 2 * row * nodes;
+    return rows.data() + row * nodes;
   }
-  TableExtent table_extent(std::size_t object) const;
-  /// Largest magnitude of an element's log-likelihood by Eq. 7, for log odds of this magnitude.
-  double largest_nats(double largest_log_odds) const;
 
   Kind kind = Kind::products;
   double ratio = 0.0;      ///< r
@@ -88,7 +77,7 @@ struct ReadingForm {
   std::size_t nodes = 0;
   std::size_t readings = 0;
   std::size_t sets = 0;
-  std::vector<double> rows;  ///< [set, reading, values and differences, node]
+  std::vector<double> rows;  ///< [set, reading, node]
 };
 
 /// Most lanes of a vector. Lists that kernels read are padded to a multiple of it.

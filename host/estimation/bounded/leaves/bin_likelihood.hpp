@@ -23,8 +23,6 @@ struct PlacedMap {
 
   /// Bound, in cells along an axis, of the float64 rounding of an element's place at a bin.
   double place_error(const KnownElements& elements) const;
-  /// Bound of the change of log odds where a place is wrong by so many cells along both axes.
-  double change(double place_cells) const;
 
   MapPatches nodes;
   double cell_mm;
@@ -51,7 +49,7 @@ class BinLikelihood {
   /// @throws Error where a map has too many cells
   BinLikelihood(std::span<const Hypothesis> hypotheses, const ContactModel& contact,
                 const PoseLattice& lattice, const DisplacementSd& touch_sd = {});
-  void move_pivot(const glm::dvec2& pivot_mm);
+  void move_pivot(const glm::dvec2& pivot_mm) { lattice_.pivot_mm = pivot_mm; }
 
   /// Log-likelihood of the elements at every bin in nats, boxes one after another, [y, x] in each.
   /// On the threads of the caller's TBB arena. Fastest where boxes of one object and theta stand

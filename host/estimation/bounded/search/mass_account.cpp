@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <functional>
 #include <tuple>
 
 namespace palpate {
@@ -131,8 +132,6 @@ std::vector<double> MassAccount::droppable_evidence(double tolerance) const {
   return largest;
 }
 
-double MassAccount::dropped_share() const { return std::exp(all_dropped_.log() - log_total_); }
-
 SearchResult MassAccount::result() const {
   SearchResult result{.mass = {},
                       .best_object = mode_object_,
@@ -166,20 +165,23 @@ std::size_t UnsettledMass::slot(double bound) const {
                                                  : static_cast<std::size_t>(std::max(below, 0.0));
 }
 
-double UnsettledMass::upper_edge(std::size_t slot) const {
-  return largest_ - static_cast<double>(slot) * slot_nats_;
-}
-
-template <typename Bins, typename Visit>
-UnsettledMass::Reached UnsettledMass::add_up(const SlotSet& used, const Bins& bins_in,
-                                             const Visit& visit) const {
+template <typename Visit>
+UnsettledMass::Reached UnsettledMass::add_up(const Hypotheses& of, const Visit& visit) const {
+  SlotSet used{};
+  for (std::size_t i = of.first; i < of.end; ++i) {
+    std::ranges::transform(used, used_[i], used.begin(), std::bit_or());
+  }
   Reached reached;
   for (std::size_t word = used.size(); word-- > 0;) {
     for (std::uint64_t left = used[word]; left != 0;) {
       const std::size_t bit = 63 - static_cast<std::size_t>(std::countl_zero(left));
       left ^= std::uint64_t{1} << bit;
       const std::size_t slot = 64 * word + bit;
-      if (const std::int64_t bins = bins_in(slot); bins > 0) {
+      std::int64_t bins = 0;
+      for (std::size_t i = of.first; i < of.end; ++i) {
+        bins += bins_[i * slots + slot];
+      }
+      if (bins > 0) {
         reached = {reached.bins * decay(reached.slot - slot) + static_cast<double>(bins), slot};
         if (!visit(reached)) {
           return reached;
@@ -191,49 +193,20 @@ UnsettledMass::Reached UnsettledMass::add_up(const SlotSet& used, const Bins& bi
 }
 
 UnsettledMass::Reached UnsettledMass::add_up(std::size_t hypothesis) const {
-  return add_up(
-      used_[hypothesis], [&](std::size_t slot) { return bins_[hypothesis * slots + slot]; },
-      [](const Reached&) { return true; });
+  return add_up({hypothesis, hypothesis + 1}, [](const Reached&) { return true; });
 }
 
-template <typename Bins>
-std::size_t UnsettledMass::droppable_from(const SlotSet& used, const Bins& bins_in,
-                                          double log_allowance) const {
+std::size_t UnsettledMass::droppable_from(const Hypotheses& of, double log_allowance) const {
   // The log of any number of bins is less.
   constexpr double most_log_bins = 44.0;
   std::size_t from = 0;
-  add_up(used, bins_in, [&](const Reached& reached) {
+  add_up(of, [&](const Reached& reached) {
     const double log_room = log_allowance - upper_edge(reached.slot);
     const bool fits = !(log_room < most_log_bins && std::log(reached.bins) > log_room);
     from = fits ? 0 : reached.slot + 1;
     return fits;
   });
   return from;
-}
-
-std::size_t UnsettledMass::droppable_from(double log_allowance) const {
-  SlotSet used{};
-  for (const SlotSet& of : used_) {
-    for (std::size_t word = 0; word < used.size(); ++word) {
-      used[word] |= of[word];
-    }
-  }
-  return droppable_from(
-      used,
-      [&](std::size_t slot) {
-        std::int64_t bins = 0;
-        for (std::size_t i = slot; i < bins_.size(); i += slots) {
-          bins += bins_[i];
-        }
-        return bins;
-      },
-      log_allowance);
-}
-
-std::size_t UnsettledMass::droppable_from(std::size_t hypothesis, double log_allowance) const {
-  return droppable_from(
-      used_[hypothesis], [&](std::size_t slot) { return bins_[hypothesis * slots + slot]; },
-      log_allowance);
 }
 
 double UnsettledMass::log_mass(std::size_t hypothesis) const {

@@ -38,9 +38,13 @@ class UnsettledMass {
   }
 
   /// The first slot from which on all tiles together hold at most this mass, in nats.
-  std::size_t droppable_from(double log_allowance) const;
+  std::size_t droppable_from(double log_allowance) const {
+    return droppable_from({0, used_.size()}, log_allowance);
+  }
   /// The first slot from which on one hypothesis's tiles hold at most this mass, in nats.
-  std::size_t droppable_from(std::size_t hypothesis, double log_allowance) const;
+  std::size_t droppable_from(std::size_t hypothesis, double log_allowance) const {
+    return droppable_from({hypothesis, hypothesis + 1}, log_allowance);
+  }
   /// Bound of the log of a hypothesis's summed likelihood, in nats.
   double log_mass(std::size_t hypothesis) const;
   /// The largest bound that a tile of a hypothesis may have, in nats; -infinity without any.
@@ -58,16 +62,21 @@ class UnsettledMass {
     std::size_t slot = slots;
   };
 
+  /// Some neighbouring hypotheses.
+  struct Hypotheses {
+    std::size_t first;
+    std::size_t end;
+  };
+
   /// Adds up slots from the last one on, until `visit`, after each that holds bins, returns false.
-  /// @param used slots that may hold bins
-  /// @param bins_in(slot) their number
-  template <typename Bins, typename Visit>
-  Reached add_up(const SlotSet& used, const Bins& bins_in, const Visit& visit) const;
+  template <typename Visit>
+  Reached add_up(const Hypotheses& of, const Visit& visit) const;
   Reached add_up(std::size_t hypothesis) const;
-  template <typename Bins>
-  std::size_t droppable_from(const SlotSet& used, const Bins& bins_in, double log_allowance) const;
+  std::size_t droppable_from(const Hypotheses& of, double log_allowance) const;
   /// The bound that no tile in a slot exceeds, in nats.
-  double upper_edge(std::size_t slot) const;
+  double upper_edge(std::size_t slot) const {
+    return largest_ - static_cast<double>(slot) * slot_nats_;
+  }
   /// What a bin counts for, that many slots further up.
   double decay(std::size_t slots_up) const {
     return slots_up < decay_.size() ? decay_[slots_up]
@@ -114,7 +123,7 @@ class MassAccount {
   /// part of the total.
   std::vector<std::size_t> droppable_from(const UnsettledMass& tiles, double tolerance) const;
   /// What was dropped so far as a part of the total, at most.
-  double dropped_share() const;
+  double dropped_share() const { return std::exp(all_dropped_.log() - log_total_); }
   /// Lower bound of the log of the total mass, in nats.
   double log_total() const { return log_total_; }
   /// What the best bin has at least, with the prior weight, in nats.

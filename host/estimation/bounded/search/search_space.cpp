@@ -12,24 +12,30 @@
 
 namespace palpate {
 
+std::vector<TileSize> tile_sizes(std::span<const Hypothesis> hypotheses,
+                                 const BoundedOptions& options) {
+  double least_cell_mm = std::numeric_limits<double>::infinity();
+  for (const Hypothesis& hypothesis : hypotheses) {
+    least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
+  }
+  return tile_sizes(options.lattice, least_cell_mm, hypotheses.size(), options.touch_sd);
+}
+
 SearchSpace::SearchSpace(std::span<const Hypothesis> hypotheses, const BoundedOptions& options)
     : log_weight(log_weights(hypotheses)) {
   for (int theta = 0; theta < options.lattice.theta_rad.count; ++theta) {
     const double theta_rad = options.lattice.theta_rad.centre(theta);
     turns.emplace_back(std::cos(theta_rad), std::sin(theta_rad));
   }
-  double least_cell_mm = std::numeric_limits<double>::infinity();
   std::map<std::string, std::size_t> labels;
   for (const Hypothesis& hypothesis : hypotheses) {
-    least_cell_mm = std::min(least_cell_mm, hypothesis.compared().cell_mm);
     label_of.push_back(labels.try_emplace(hypothesis.map.label, labels.size()).first->second);
     boxes.push_back(occupied_box(hypothesis.map));
     OccupancyGrid shape = hypothesis.compared();
     shape.log_odds = {};
     maps.push_back(std::move(shape));
   }
-  const std::vector<TileSize> sizes =
-      tile_sizes(options.lattice, least_cell_mm, hypotheses.size(), options.touch_sd);
+  const std::vector<TileSize> sizes = tile_sizes(hypotheses, options);
   if (!options.touch_sd.none()) {
     displacement.emplace(options.lattice, options.touch_sd);
     for (const TileSize& size : sizes) {

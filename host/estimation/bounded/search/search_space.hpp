@@ -116,6 +116,10 @@ struct SearchResult {
   }
 };
 
+/// The sizes of tiles of a search for these hypotheses.
+std::vector<TileSize> tile_sizes(std::span<const Hypothesis> hypotheses,
+                                 const BoundedOptions& options);
+
 /// What searches through the poses of the same objects share: the levels of tiles, and the window
 /// tables that bound the likelihood over them.
 struct SearchSpace {

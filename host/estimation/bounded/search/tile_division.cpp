@@ -12,23 +12,6 @@
 
 namespace palpate {
 
-namespace {
-
-std::vector<Tile> joined(const std::vector<std::vector<Tile>>& lists) {
-  std::vector<Tile> all;
-  std::size_t count = 0;
-  for (const std::vector<Tile>& list : lists) {
-    count += list.size();
-  }
-  all.reserve(count);
-  for (const std::vector<Tile>& list : lists) {
-    all.insert(all.end(), list.begin(), list.end());
-  }
-  return all;
-}
-
-}  // namespace
-
 bool larger_first(const Tile& a, const Tile& b) {
   return a.bound != b.bound ? a.bound > b.bound : stands_before(a, b);
 }
@@ -149,7 +132,11 @@ std::vector<Tile> TileDivision::largest_above(double bound) const {
       above[row].push_back(tile);
     });
   });
-  return joined(above);
+  std::vector<Tile> all;
+  for (const std::vector<Tile>& of_row : above) {
+    all.insert(all.end(), of_row.begin(), of_row.end());
+  }
+  return all;
 }
 
 std::vector<Tile> TileDivision::best_smallest(std::vector<Tile> tiles, std::size_t level,

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 
 #include "estimation/parallel_for.hpp"
 
@@ -42,32 +41,18 @@ int side_of_bins(double x_cells, double y_cells) {
   return side;
 }
 
-/// Tiles of single bins where these are sparse and few, and their squares about as large as a cell.
-std::optional<TileSize> single_bins(const PoseLattice& lattice, double least_cell_mm,
-                                    std::size_t maps) {
-  const double x_cells = lattice.x_mm.step() / least_cell_mm;
-  const double y_cells = lattice.y_mm.step() / least_cell_mm;
-  const double bins = static_cast<double>(lattice.x_mm.count) * lattice.y_mm.count *
-                      lattice.theta_rad.count * static_cast<double>(maps);
-  if (std::min(x_cells, y_cells) < sparse_cells || bins > most_single_bins) {
-    return {};
-  }
-  return TileSize{.side = side_of_bins(x_cells, y_cells), .bins = 1};
-}
-
 double step_mm(const Axis& axis) { return axis.count > 1 ? axis.step() : 0.0; }
-
-TileSize tile_of_bins(const PoseLattice& lattice, double least_cell_mm, int bins) {
-  const double x_cells = bins * step_mm(lattice.x_mm) / least_cell_mm;
-  const double y_cells = bins * step_mm(lattice.y_mm) / least_cell_mm;
-  return {.side = side_of_bins(std::max(x_cells, 1.0), std::max(y_cells, 1.0)), .bins = bins};
-}
 
 /// Tiles of whole bins, where touches are displaced.
 std::vector<TileSize> sizes_in_bins(const PoseLattice& lattice, double least_cell_mm,
                                     std::size_t maps, const DisplacementSd& touch_sd) {
   const double step = std::max(step_mm(lattice.x_mm), step_mm(lattice.y_mm));
-  const auto size_of = [&](int bins) { return tile_of_bins(lattice, least_cell_mm, bins); };
+  const auto size_of = [&](int bins) {
+    const auto cells = [&](const Axis& axis) {
+      return std::max(bins * step_mm(axis) / least_cell_mm, 1.0);
+    };
+    return TileSize{.side = side_of_bins(cells(lattice.x_mm), cells(lattice.y_mm)), .bins = bins};
+  };
   const double smallest_mm = std::max(smallest_sd * touch_sd.mm, smallest_cells * least_cell_mm);
   int bins = 1;
   while (2 * bins * step <= smallest_mm &&
@@ -91,39 +76,27 @@ std::vector<TileSize> sizes_in_bins(const PoseLattice& lattice, double least_cel
   return sizes;
 }
 
-TileAxis axis_of_bins(const Axis& axis, int bins, double side_mm) {
+TileAxis tile_axis(const Axis& axis, const TileSize& size, double side_mm) {
   TileAxis tiles{.first_mm = axis.centre(0), .side_mm = side_mm, .first_bin = {}};
-  const int batches = (axis.count - 1) / (bins * batch_side) + 1;
-  for (int tile = 0; tile <= batch_side * batches; ++tile) {
-    tiles.first_bin.push_back(
-        static_cast<int>(std::min(std::int64_t{tile} * bins, std::int64_t{axis.count})));
-  }
-  return tiles;
-}
-
-TileAxis tile_axis(const Axis& axis, double side_mm) {
-  TileAxis tiles{.first_mm = axis.centre(0), .side_mm = side_mm, .first_bin = {}};
-  const double step = axis.step();
   // Tiles of all levels that begin at one place agree on the first bin: the product is exact alike,
   // for sides differ by powers of two.
   const auto first_bin = [&](int tile) {
     const double begin_mm = tile * side_mm;
-    const double first = begin_mm == 0.0 ? 0.0 : std::ceil(begin_mm / step);
+    const double first = size.bins > 0     ? static_cast<double>(tile) * size.bins
+                         : begin_mm == 0.0 ? 0.0
+                                           : std::ceil(begin_mm / axis.step());
     return static_cast<int>(std::min<double>(first, axis.count));
   };
   // A whole number of batches, which ends where no bin is left by the same rounding: a tile with
   // bins then has all of its parts.
-  const double extent_mm = step * (axis.count - 1);
-  auto batches = static_cast<int>(std::floor(extent_mm / (batch_side * side_mm))) + 1;
-  while (first_bin(batch_side * batches) < axis.count) {
-    ++batches;
+  auto count = batch_side * static_cast<int>(batches_along(axis, size, side_mm));
+  while (first_bin(count) < axis.count) {
+    count += batch_side;
   }
-  const int count = batch_side * batches;
   tiles.first_bin.reserve(static_cast<std::size_t>(count) + 1);
-  for (int tile = 0; tile < count; ++tile) {
+  for (int tile = 0; tile <= count; ++tile) {
     tiles.first_bin.push_back(first_bin(tile));
   }
-  tiles.first_bin.push_back(axis.count);
   return tiles;
 }
 
@@ -134,8 +107,13 @@ std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_m
   if (!touch_sd.none()) {
     return sizes_in_bins(lattice, least_cell_mm, maps, touch_sd);
   }
-  if (const std::optional<TileSize> size = single_bins(lattice, least_cell_mm, maps)) {
-    return {*size};
+  const double x_cells = lattice.x_mm.step() / least_cell_mm;
+  const double y_cells = lattice.y_mm.step() / least_cell_mm;
+  const double all_bins = static_cast<double>(lattice.x_mm.count) * lattice.y_mm.count *
+                          lattice.theta_rad.count * static_cast<double>(maps);
+  if (std::min(x_cells, y_cells) >= sparse_cells && all_bins <= most_single_bins) {
+    // Single bins are sparse and few; their squares are about as large as a cell.
+    return {{.side = side_of_bins(x_cells, y_cells), .bins = 1}};
   }
   const auto tiles = [&](const TileSize& size) {
     const double side_mm = size.cells() * least_cell_mm;
@@ -174,19 +152,20 @@ glm::dvec2 square_mm(const TileSize& size, const PoseLattice& lattice, double ce
   return {along(lattice.x_mm), along(lattice.y_mm)};
 }
 
+double batches_along(const Axis& axis, const TileSize& size, double side_mm) {
+  return size.bins > 0 ? std::ceil(static_cast<double>(axis.count) / (batch_side * size.bins))
+                       : std::floor(axis.step() * (axis.count - 1) / (batch_side * side_mm)) + 1.0;
+}
+
 std::vector<TileLevel> tile_levels(const PoseLattice& lattice, double cell_mm,
                                    const std::vector<TileSize>& sizes) {
   std::vector<TileLevel> levels;
   for (const TileSize& size : sizes) {
     const glm::dvec2 square = square_mm(size, lattice, cell_mm);
-    const auto along = [&](const Axis& axis, double square_side_mm) {
-      return size.bins > 0 ? axis_of_bins(axis, size.bins, size.side * square_side_mm)
-                           : tile_axis(axis, size.cells() * cell_mm);
-    };
     levels.push_back({.size = size,
                       .square_mm = square,
-                      .x = along(lattice.x_mm, square.x),
-                      .y = along(lattice.y_mm, square.y)});
+                      .x = tile_axis(lattice.x_mm, size, size.side * square.x),
+                      .y = tile_axis(lattice.y_mm, size, size.side * square.y)});
   }
   return levels;
 }
@@ -260,7 +239,7 @@ std::size_t TileBounds::bytes() const {
   std::size_t bytes = 0;
   for (const std::vector<WindowTable>& level : tables_) {
     for (const WindowTable& table : level) {
-      bytes += table.bytes();
+      bytes += table.entries.capacity() * sizeof(std::uint16_t);
     }
   }
   return bytes;

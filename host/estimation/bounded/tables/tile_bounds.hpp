@@ -9,9 +9,9 @@
 #include "estimation/bounded/tables/window_table.hpp"
 #include "estimation/known_elements.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
+#include "palpate/pose.hpp"
 
 namespace palpate {
 
@@ -104,6 +104,9 @@ std::vector<TileSize> tile_sizes(const PoseLattice& lattice, double least_cell_m
 
 /// The squares of a level over a map of this cell.
 glm::dvec2 square_mm(const TileSize& size, const PoseLattice& lattice, double cell_mm);
+
+/// Batches of tiles along an axis, but for one more where rounding asks for it.
+double batches_along(const Axis& axis, const TileSize& size, double side_mm);
 
 /// The levels of tiles over a lattice for a map of this cell.
 std::vector<TileLevel> tile_levels(const PoseLattice& lattice, double cell_mm,

@@ -16,9 +16,8 @@ namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-void PlaceWindows(const glm::dvec2* from_pivot_mm, std::size_t count, const TilePlace& place,
-                  const WindowTable& shape, std::int32_t* plane, std::int32_t* column,
-                  std::int32_t* row) {
+void PlaceWindows(std::span<const glm::dvec2> from_pivot_mm, const TilePlace& place,
+                  const WindowTable& shape, WindowPlaces& placed) {
   const hn::ScalableTag<double> d;
   const hn::Rebind<std::int32_t, decltype(d)> di;
   // Squares that are told apart; farther elements see only the prior as well.
@@ -38,8 +37,8 @@ void PlaceWindows(const glm::dvec2* from_pivot_mm, std::size_t count, const Tile
   HWY_ALIGN double x_mm[hn::MaxLanes(d)] = {};
   HWY_ALIGN double y_mm[hn::MaxLanes(d)] = {};
   const std::size_t step = hn::Lanes(d);
-  for (std::size_t i = 0; i < count; i += step) {
-    for (std::size_t lane = 0; lane < std::min(step, count - i); ++lane) {
+  for (std::size_t i = 0; i < from_pivot_mm.size(); i += step) {
+    for (std::size_t lane = 0; lane < std::min(step, from_pivot_mm.size() - i); ++lane) {
       x_mm[lane] = from_pivot_mm[i + lane].x;
       y_mm[lane] = from_pivot_mm[i + lane].y;
     }
@@ -51,9 +50,10 @@ void PlaceWindows(const glm::dvec2* from_pivot_mm, std::size_t count, const Tile
     const auto kx = at(hn::Add(hn::Sub(hn::Mul(cx, px), hn::Mul(sx, py)), x0));
     const auto ky = at(hn::Add(hn::Add(hn::Mul(sy, px), hn::Mul(cy, py)), y0));
     const auto phase = hn::Add(hn::Mul(hn::And(ky, mask), phases), hn::And(kx, mask));
-    hn::StoreU(hn::Mul(phase, entries), di, plane + i);
-    hn::StoreU(hn::Add(hn::ShiftRightSame(kx, shape.side_log2), margin), di, column + i);
-    hn::StoreU(hn::Add(hn::ShiftRightSame(ky, shape.side_log2), margin), di, row + i);
+    hn::StoreU(hn::Mul(phase, entries), di, placed.plane.data() + i);
+    hn::StoreU(hn::Add(hn::ShiftRightSame(kx, shape.side_log2), margin), di,
+               placed.column.data() + i);
+    hn::StoreU(hn::Add(hn::ShiftRightSame(ky, shape.side_log2), margin), di, placed.row.data() + i);
   }
 }
 
@@ -72,13 +72,12 @@ HWY_INLINE void add_part(const std::uint16_t* part, std::size_t count, std::uint
 }
 
 /// Sums the penalties of runs over one batch.
-/// @param plane, column, row of the first run's first element
 /// @param entry scratch of at least as many elements, rounded up to whole vectors
-void AddRuns(const TableRun* runs, std::size_t run_count, const std::int32_t* plane,
-             const std::int32_t* column, const std::int32_t* row, int first_x, int first_y,
+void AddRuns(std::span<const TableRun> runs, const WindowPlaces& placed, int first_x, int first_y,
              std::int32_t* entry, std::uint32_t* sums) {
-  const WindowTable& table = *runs->table;  // as all others in shape
-  const std::size_t count = runs[run_count - 1].end - runs->begin;
+  const WindowTable& table = *runs.front().table;  // as all others in shape
+  const std::size_t first = runs.front().begin;
+  const std::size_t count = runs.back().end - first;
   const hn::ScalableTag<std::int32_t> di;
   const auto zero = hn::Zero(di);
   const auto x = hn::Set(di, first_x);
@@ -86,6 +85,9 @@ void AddRuns(const TableRun* runs, std::size_t run_count, const std::int32_t* pl
   const auto last_column = hn::Set(di, table.columns - batch_side);
   const auto last_row = hn::Set(di, table.rows - batch_side);
   const auto columns = hn::Set(di, table.columns);
+  const std::int32_t* const plane = placed.plane.data() + first;
+  const std::int32_t* const column = placed.column.data() + first;
+  const std::int32_t* const row = placed.row.data() + first;
   for (std::size_t i = 0; i < count; i += hn::Lanes(di)) {
     const auto at_column =
         hn::Min(hn::Max(hn::Add(hn::LoadU(di, column + i), x), zero), last_column);
@@ -98,11 +100,11 @@ void AddRuns(const TableRun* runs, std::size_t run_count, const std::int32_t* pl
   constexpr std::size_t vectors = batch_tiles / lanes;
   HWY_ALIGN std::uint16_t part[batch_tiles] = {};
   std::size_t room = largest_part;
-  for (const TableRun* run = runs; run != runs + run_count; ++run) {
-    const std::size_t largest = run->table->largest;
-    const std::uint16_t* entries = run->table->entries.data();
-    for (std::size_t begin = run->begin - runs->begin; begin < run->end - runs->begin;) {
-      const std::size_t left = run->end - runs->begin - begin;
+  for (const TableRun& run : runs) {
+    const std::size_t largest = run.table->largest;
+    const std::uint16_t* entries = run.table->entries.data();
+    for (std::size_t begin = run.begin - first; begin < run.end - first;) {
+      const std::size_t left = run.end - first - begin;
       const std::size_t some = largest == 0 ? left : std::min(left, room / largest);
       if (some == 0) {
         add_part(part, batch_tiles, sums);
@@ -149,13 +151,10 @@ constexpr std::size_t slack = 64;
 
 void place_windows(const KnownElements& elements, const TilePlace& place, const WindowTable& shape,
                    WindowPlaces& placed) {
-  const std::size_t count = elements.from_pivot_mm.size();
   for (std::vector<std::int32_t>* list : {&placed.plane, &placed.column, &placed.row}) {
-    list->resize(count + slack);
+    list->resize(elements.from_pivot_mm.size() + slack);
   }
-  HWY_DYNAMIC_DISPATCH(PlaceWindows)
-  (elements.from_pivot_mm.data(), count, place, shape, placed.plane.data(), placed.column.data(),
-   placed.row.data());
+  HWY_DYNAMIC_DISPATCH(PlaceWindows)(elements.from_pivot_mm, place, shape, placed);
 }
 
 void add_penalties(const WindowPlaces& placed, std::span<const TableRun> runs, int first_x,
@@ -164,11 +163,8 @@ void add_penalties(const WindowPlaces& placed, std::span<const TableRun> runs, i
     return;
   }
   thread_local std::vector<std::int32_t> scratch;
-  const std::size_t first = runs.front().begin;
-  scratch.resize(std::max(scratch.size(), runs.back().end - first + slack));
-  HWY_DYNAMIC_DISPATCH(AddRuns)
-  (runs.data(), runs.size(), placed.plane.data() + first, placed.column.data() + first,
-   placed.row.data() + first, first_x, first_y, scratch.data(), sums);
+  scratch.resize(std::max(scratch.size(), runs.back().end - runs.front().begin + slack));
+  HWY_DYNAMIC_DISPATCH(AddRuns)(runs, placed, first_x, first_y, scratch.data(), sums);
 }
 
 }  // namespace palpate

@@ -19,55 +19,35 @@ constexpr double margin = 0.01;
 
 /// The largest log-likelihood of a reading over an interval of log odds. Eq. 7 rises or falls with
 /// the log odds, and is largest at an end; a table is so at an end or at a node between.
-class LargestLikelihood {
- public:
-  LargestLikelihood(const ContactModel& contact, Reading reading, std::size_t object)
-      : contact_(contact), reading_(reading) {
-    if (contact.table) {
-      const LikelihoodTable& table = *contact.table;
-      const std::size_t set = table.sets() == 1 ? 0 : object;
-      nodes_ =
-          std::span(table.log_likelihood)
-              .subspan((set * table.levels() + static_cast<std::size_t>(reading)) * table.nodes,
-                       table.nodes);
-    }
+double largest_in(const Extremes& range, const ContactModel& contact, Reading reading,
+                  std::size_t object) {
+  const auto at = [&](double log_odds) {
+    return contact.log_likelihood(reading, {log_odds}, object);
+  };
+  if (!contact.table) {
+    return at(reading == Reading::no_contact ? range.least : range.most);
   }
-
-  double in(const MapSquares::Range& range) const {
-    if (nodes_.empty()) {
-      return contact_.log_likelihood(reading_,
-                                     {reading_ == Reading::no_contact ? range.low : range.high});
-    }
-    const double low = place_of(range.low);
-    const double high = place_of(range.high);
-    double highest = std::max(at(low), at(high));
-    // A node too many on either side leaves bounds true: rounding must not leave one out.
-    constexpr double rounding = 1e-6;
-    for (auto i = static_cast<std::size_t>(low + 1.0 - rounding);
-         i < std::min(static_cast<std::size_t>(high + 1.0 + rounding), nodes_.size()); ++i) {
-      highest = std::max(highest, nodes_[i]);
-    }
-    return highest;
+  const LikelihoodTable& table = *contact.table;
+  const std::size_t set = table.sets() == 1 ? 0 : object;
+  const std::span<const double> nodes =
+      std::span(table.log_likelihood)
+          .subspan((set * table.levels() + static_cast<std::size_t>(reading)) * table.nodes,
+                   table.nodes);
+  const auto last = static_cast<double>(table.nodes - 1);
+  const double nodes_per_nat = last / (table.last_log_odds - table.first_log_odds);
+  // A node too many on either side leaves bounds true: rounding must not leave one out.
+  constexpr double rounding = 1e-6;
+  const auto node_after = [&](double log_odds, double margin) {
+    const double place = (log_odds - table.first_log_odds) * nodes_per_nat;
+    return static_cast<std::size_t>(std::clamp(place, 0.0, last) + 1.0 + margin);
+  };
+  double highest = std::max(at(range.least), at(range.most));
+  for (std::size_t i = node_after(range.least, -rounding);
+       i < std::min(node_after(range.most, rounding), table.nodes); ++i) {
+    highest = std::max(highest, nodes[i]);
   }
-
- private:
-  /// In nodes, as ContactModel::log_likelihood() has it.
-  double place_of(double log_odds) const {
-    const LikelihoodTable& table = *contact_.table;
-    const auto last = static_cast<double>(table.nodes - 1);
-    const double width = table.last_log_odds - table.first_log_odds;
-    return std::clamp((log_odds - table.first_log_odds) * last / width, 0.0, last);
-  }
-  double at(double place) const {
-    const std::size_t node = std::min(static_cast<std::size_t>(place), nodes_.size() - 2);
-    const double fraction = place - static_cast<double>(node);
-    return (1.0 - fraction) * nodes_[node] + fraction * nodes_[node + 1];
-  }
-
-  const ContactModel& contact_;
-  Reading reading_;
-  std::span<const double> nodes_;
-};
+  return highest;
+}
 
 /// Places along one axis where log odds may be extreme in a square: its borders, and the nodes
 /// between them. Each lies between a node, of which -1 is the prior's before the first, and the
@@ -140,10 +120,11 @@ MapSquares map_squares(const OccupancyGrid& map, double prior_log_odds,
   squares.ranges.reserve(static_cast<std::size_t>(squares.nx) * squares.ny);
   for (int j = 0; j < squares.ny; ++j) {
     for (int i = 0; i < squares.nx; ++i) {
-      MapSquares::Range& range = squares.ranges.emplace_back();
+      constexpr double infinity = std::numeric_limits<double>::infinity();
+      Extremes& range = squares.ranges.emplace_back(Extremes{infinity, -infinity});
       for (int row = y.first[j]; row <= y.first[j + 1]; ++row) {
         for (int column = x.first[i]; column <= x.first[i + 1]; ++column) {
-          range.take_in(log_odds[static_cast<std::size_t>(row) * x.node.size() + column]);
+          range.include(log_odds[static_cast<std::size_t>(row) * x.node.size() + column]);
         }
       }
     }
@@ -153,14 +134,13 @@ MapSquares map_squares(const OccupancyGrid& map, double prior_log_odds,
 
 SquarePenalties square_penalties(const MapSquares& squares, const ContactModel& contact,
                                  Reading reading, std::size_t object) {
-  const LargestLikelihood largest(contact, reading, object);
   const double prior =
       contact.log_likelihood(reading, {log_odds_from_probability(*contact.prior)}, object);
   SquarePenalties penalties{.best = prior, .nx = squares.nx, .ny = squares.ny, .least = {}};
   std::vector<double> highest;
   highest.reserve(squares.ranges.size());
-  for (const MapSquares::Range& range : squares.ranges) {
-    highest.push_back(largest.in(range));
+  for (const Extremes& range : squares.ranges) {
+    highest.push_back(largest_in(range, contact, reading, object));
     penalties.best = std::max(penalties.best, highest.back());
   }
   const auto penalty = [&](double log_likelihood) {

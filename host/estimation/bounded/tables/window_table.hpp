@@ -1,15 +1,14 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
 
 #include "estimation/known_elements.hpp"
+#include "model/extremes.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -18,19 +17,9 @@ namespace palpate {
 /// A map with one node of the prior around it, divided into equal rectangles, its squares: the
 /// range of the log odds, bilinear between the nodes, in each.
 struct MapSquares {
-  struct Range {
-    double low = std::numeric_limits<double>::infinity();  ///< nats
-    double high = -std::numeric_limits<double>::infinity();
-
-    void take_in(double log_odds) {
-      low = std::min(low, log_odds);
-      high = std::max(high, log_odds);
-    }
-  };
-
   int nx = 0;
   int ny = 0;
-  std::vector<Range> ranges;  ///< [ny, nx]
+  std::vector<Extremes> ranges;  ///< [ny, nx] in nats
 };
 
 /// Squares of any size. The last of a row or column may reach beyond the map.
@@ -83,7 +72,6 @@ struct WindowTable {
   /// Entry of a plane at which a window stands that begins at square 0 of phase 0: smaller windows
   /// lie below the map.
   static constexpr int margin = batch_side + 1;
-  std::size_t bytes() const { return entries.capacity() * sizeof(std::uint16_t); }
 };
 
 /// @param side a power of two
