@@ -14,9 +14,9 @@
 #include "cli/sensor_option.hpp"
 #include "model/printable.hpp"
 #include "model/stream_time.hpp"
-#include "palpate/baseline.hpp"
 #include "palpate/error.hpp"
 #include "palpate/frame_recorder.hpp"
+#include "palpate/sensor.hpp"
 #include "palpate/touch_detector.hpp"
 #include "palpate/virtual_sensor.hpp"
 

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <tuple>
 
 #include "estimation/hypotheses.hpp"
-#include "estimation/pose_draws.hpp"
 #include "model/random.hpp"
+#include "palpate/pose.hpp"
 
 namespace palpate {
 
@@ -20,7 +19,7 @@ constexpr double rounding = 1e-5;  ///< of a block's sum in float32
 
 /// Calls visit(grid bin, number of bins) for every run of bins that lie in one of the grid's.
 template <typename Visit>
-void for_runs(std::span<const std::int32_t> grid_bins, const Visit& visit) {
+void for_runs(std::span<const std::int64_t> grid_bins, const Visit& visit) {
   for (std::size_t first = 0, end = 0; first < grid_bins.size(); first = end) {
     while (end < grid_bins.size() && grid_bins[end] == grid_bins[first]) {
       ++end;
@@ -29,72 +28,58 @@ void for_runs(std::span<const std::int32_t> grid_bins, const Visit& visit) {
   }
 }
 
-/// Where the bins of a lattice lie on a grid about the same pivot: a bin's indices then depend on
-/// one axis each.
-struct GridIndices {
-  std::vector<std::int32_t> column;  ///< [lattice x]
-  std::vector<std::int32_t> row;     ///< [lattice y]
-  std::vector<std::int32_t> theta;   ///< [lattice theta]
-
-  GridIndices(PoseLattice from, PoseLattice to) {
-    from.pivot_mm = to.pivot_mm = {};  // about the origin, nothing rounds
-    const double x = from.x_mm.centre(0);
-    const double y = from.y_mm.centre(0);
-    const double theta_rad = from.theta_rad.centre(0);
-    const auto bin = [&](double x_mm, double y_mm, double rad) {
-      return to.bin_of(from.T_object_robot(x_mm, y_mm, rad));
-    };
-    const auto along = [](const Axis& axis, const auto& index_of) {
-      std::vector<std::int32_t> indices(static_cast<std::size_t>(axis.count));
-      for (int i = 0; i < axis.count; ++i) {
-        indices[i] = static_cast<std::int32_t>(index_of(axis.centre(i)));
-      }
-      return indices;
-    };
-    column = along(from.x_mm, [&](double at) { return bin(at, y, theta_rad) % to.x_mm.count; });
-    row = along(from.y_mm,
-                [&](double at) { return bin(x, at, theta_rad) % to.plane() / to.x_mm.count; });
-    theta = along(from.theta_rad, [&](double at) { return bin(x, y, at) / to.plane(); });
+/// Adds the probabilities of a box's bins, exp(log-likelihood - reference + log_scale), to the sums
+/// of the grid's bins in which their centres lie. At one theta these depend on one axis each.
+void add(const BinBox& box, std::span<const double> log_likelihood, double reference,
+         double log_scale, const PoseLattice& from, Marginals& sums) {
+  const double theta_rad = from.theta_rad.centre(box.theta);
+  const glm::dvec2 shift_mm = rotate(theta_rad, sums.grid.pivot_mm - from.pivot_mm);
+  PoseLattice to = sums.grid;
+  to.pivot_mm = {};
+  const auto bin_at = [&](int column, int row) {
+    const glm::dvec2 place_mm(from.x_mm.centre(column), from.y_mm.centre(row));
+    return to.bin_of({place_mm + shift_mm, 0.0});
+  };
+  std::vector<std::int64_t> columns;
+  for (int i = 0; i < box.x_count; ++i) {
+    columns.push_back(bin_at(box.x_first + i, box.y_first) % to.x_mm.count);
   }
-
-  void add(const BinBox& box, std::span<const double> log_likelihood, double reference,
-           double log_scale, Marginals& sums) const {
-    const std::span columns = std::span(column).subspan(box.x_first, box.x_count);
-    const std::span rows = std::span(row).subspan(box.y_first, box.y_count);
-    const auto width = static_cast<std::size_t>(sums.grid.x_mm.count);
-    double all = 0.0;
-    if (log_likelihood.size() == 1) {
-      const double p = std::exp((log_likelihood[0] - reference) + log_scale);
-      for_runs(rows, [&](std::int32_t at_row, double of_rows) {
-        for_runs(columns, [&](std::int32_t at_column, double of_columns) {
-          sums.xy[at_row * width + at_column] += p * of_rows * of_columns;
-        });
+  std::vector<std::int64_t> rows;  // of a plane: index of their first bins
+  for (int i = 0; i < box.y_count; ++i) {
+    const std::int64_t at = bin_at(box.x_first, box.y_first + i) % to.plane();
+    rows.push_back(at - at % to.x_mm.count);
+  }
+  double all = 0.0;
+  if (log_likelihood.size() == 1) {
+    const double p = std::exp((log_likelihood[0] - reference) + log_scale);
+    for_runs(rows, [&](std::int64_t row, double of_rows) {
+      for_runs(columns, [&](std::int64_t column, double of_columns) {
+        sums.xy[row + column] += p * of_rows * of_columns;
       });
-      all = p * static_cast<double>(box.bins());
-    } else {
-      auto log_p = log_likelihood.begin();
-      for (const std::int32_t at_row : rows) {
-        for (const std::int32_t at_column : columns) {
-          const double p = std::exp((*log_p++ - reference) + log_scale);
-          sums.xy[at_row * width + at_column] += p;
-          all += p;
-        }
+    });
+    all = p * static_cast<double>(box.bins());
+  } else {
+    auto log_p = log_likelihood.begin();
+    for (const std::int64_t row : rows) {
+      for (const std::int64_t column : columns) {
+        const double p = std::exp((*log_p++ - reference) + log_scale);
+        sums.xy[row + column] += p;
+        all += p;
       }
     }
-    sums.theta[theta[box.theta]] += all;
   }
-};
+  sums.theta[to.bin_of({{}, theta_rad}) / to.plane()] += all;
+}
 
-/// Adds the bins of a box by their centres' poses.
-void add_by_pose(const BinBox& box, std::span<const double> log_likelihood, double reference,
-                 double log_scale, const PoseLattice& lattice, Marginals& sums) {
-  for (std::int64_t i = 0; i < box.bins(); ++i) {
-    const double l = log_likelihood[log_likelihood.size() == 1 ? 0 : i];
-    const double p = std::exp((l - reference) + log_scale);
-    const std::int64_t at = sums.grid.bin_of(lattice.T_object_robot(box.bin(i, lattice)));
-    sums.xy[at % sums.grid.plane()] += p;
-    sums.theta[at / sums.grid.plane()] += p;
-  }
+/// T_object_robot of a pose that is uniform within a bin.
+Pose draw_within(std::int64_t bin, const PoseLattice& lattice, Random& random) {
+  const auto within = [&](const Axis& axis, std::int64_t index) {
+    return axis.centre(static_cast<int>(index)) + random.uniform(-0.5, 0.5) * axis.step();
+  };
+  const double x = within(lattice.x_mm, bin % lattice.x_mm.count);
+  const double y = within(lattice.y_mm, bin % lattice.plane() / lattice.x_mm.count);
+  const double theta = within(lattice.theta_rad, bin / lattice.plane());
+  return lattice.T_object_robot(x, y, theta);
 }
 
 }  // namespace
@@ -120,17 +105,9 @@ Marginals BinBelief::marginals(int object, PoseLattice grid) const {
   if (std::exp(of.log_identity + log_objects) == 0.0) {
     return sums;
   }
-  std::optional<GridIndices> indices;
-  if (lattice.pivot_mm == grid.pivot_mm) {
-    indices.emplace(lattice, grid);
-  }
   visit(std::span(&object, 1), {negligible_share},
         [&](const BinBox& box, std::span<const double> log_likelihood) {
-          if (indices) {
-            indices->add(box, log_likelihood, of.reference, log_scale, sums);
-          } else {
-            add_by_pose(box, log_likelihood, of.reference, log_scale, lattice, sums);
-          }
+          add(box, log_likelihood, of.reference, log_scale, lattice, sums);
         });
   return sums;
 }

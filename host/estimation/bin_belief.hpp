@@ -37,7 +37,6 @@ struct BinBelief {
 
   /// Probabilities of an object's poses on a grid; a bin counts in the grid's nearest bin
   /// (PoseLattice::bin_of()). Those of all objects and "none of these" together sum to 1.
-  /// Slower where the grid has another pivot: each bin's pose is then computed.
   /// @throws Error where there is no such object, or on a grid that is not sound
   Marginals marginals(int object, PoseLattice grid) const;
   /// The bins that hold at least this share of their object's belief, [asked].

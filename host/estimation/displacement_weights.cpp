@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <tuple>
+#include <utility>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -85,8 +86,9 @@ AxisBlur::AxisBlur(const Axis& axis, double sd, int bins)
 DisplacementWeights::DisplacementWeights(const PoseLattice& lattice, const DisplacementSd& sd)
     : lattice_(lattice), sd_(sd), theta_steps_(blur_steps(lattice.theta_rad, sd.rad)) {}
 
-void DisplacementWeights::find_taps(int theta, const glm::dvec2& sensor_from_pivot_mm,
-                                    std::vector<Tap>& taps) const {
+std::vector<Tap> DisplacementWeights::taps(int theta, const glm::dvec2& sensor_from_pivot_mm,
+                                           std::vector<Tap> reuse) const {
+  std::vector<Tap> taps = std::move(reuse);
   taps.clear();
   const Axis& angles = lattice_.theta_rad;
   const double theta_rad = angles.centre(theta);
@@ -120,6 +122,7 @@ void DisplacementWeights::find_taps(int theta, const glm::dvec2& sensor_from_piv
       taps.push_back(tap);
     }
   }
+  return taps;
 }
 
 glm::dvec2 DisplacementWeights::reach_mm() const {

@@ -6,7 +6,6 @@
 
 #include <glm/vec2.hpp>
 
-#include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/pose.hpp"
 
@@ -61,13 +60,9 @@ class DisplacementWeights {
   int theta_steps() const { return theta_steps_; }
   /// The thetas that a mean at this theta takes likelihoods from, as far as the region reaches.
   /// @param sensor_from_pivot_mm the sensor's origin, in the robot frame
-  std::vector<Tap> taps(int theta, const glm::dvec2& sensor_from_pivot_mm) const {
-    std::vector<Tap> taps;
-    find_taps(theta, sensor_from_pivot_mm, taps);
-    return taps;
-  }
-  /// Puts what taps() returns in the place of what the list held, in its memory.
-  void find_taps(int theta, const glm::dvec2& sensor_from_pivot_mm, std::vector<Tap>& taps) const;
+  /// @param reuse memory for the result
+  std::vector<Tap> taps(int theta, const glm::dvec2& sensor_from_pivot_mm,
+                        std::vector<Tap> reuse = {}) const;
   /// How far the bins that a mean takes lie from a tap's place, in mm along x and y, at most.
   glm::dvec2 reach_mm() const;
 

@@ -56,22 +56,6 @@ constexpr double least_product_floor = 1e-3;
 
 std::uint32_t bits(double value) { return std::bit_cast<std::uint32_t>(static_cast<float>(value)); }
 
-std::size_t nodes_of_a_set(const ContactModel& model) {
-  return model.table ? model.table->levels() * model.table->nodes : 0;
-}
-
-/// The log-likelihoods [level, node] of one set.
-void append_set(std::vector<shaders::TableNode>& nodes, const LikelihoodTable& table,
-                std::span<const double> log_likelihood) {
-  for (std::size_t level = 0; level < table.levels(); ++level) {
-    const std::span<const double> row = log_likelihood.subspan(level * table.nodes, table.nodes);
-    for (std::size_t i = 0; i < table.nodes; ++i) {
-      nodes.push_back({.nats = static_cast<float>(row[i]),
-                       .rise = static_cast<float>(row[std::min(i + 1, table.nodes - 1)] - row[i])});
-    }
-  }
-}
-
 }  // namespace
 
 std::vector<float> with_border(const OccupancyGrid& map, double prior) {
@@ -190,10 +174,8 @@ std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const Co
 }
 
 ContactTable::ContactTable(gpu::Context& context, gpu::CommandStream& stream,
-                           const ContactModel& model)
-    : nodes_of_a_set_(nodes_of_a_set(model)) {
-  const std::uint64_t count =
-      std::max<std::uint64_t>(1, (model.table ? model.table->sets() : 0) * nodes_of_a_set_);
+                           const ContactModel& model) {
+  const std::uint64_t count = model.table ? model.table->log_likelihood.size() : 1;
   const std::uint64_t limit = std::min<std::uint64_t>(
       context.limits().table_texels, context.limits().allocation / sizeof(shaders::TableNode));
   if (count > limit) {
@@ -205,18 +187,16 @@ ContactTable::ContactTable(gpu::Context& context, gpu::CommandStream& stream,
   }
   std::vector<shaders::TableNode> nodes;
   if (const auto& table = model.table) {
-    sets_ = table->sets();
-    const std::size_t numbers = table->levels() * table->nodes;
-    for (std::size_t set = 0; set < sets_; ++set) {
-      append_set(nodes, *table, std::span(table->log_likelihood).subspan(set * numbers, numbers));
+    nodes_of_a_set_ = table->sets() == 1 ? 0 : table->levels() * table->nodes;
+    const std::vector<double>& nats = table->log_likelihood;
+    for (std::size_t i = 0; i < nats.size(); ++i) {
+      const bool last = (i + 1) % table->nodes == 0;  // of its level
+      nodes.push_back({.nats = static_cast<float>(nats[i]),
+                       .rise = last ? 0.0F : static_cast<float>(nats[i + 1] - nats[i])});
     }
   }
   nodes.resize(count);
   nodes_ = stream.uploaded(nodes, "the likelihood table", VK_FORMAT_R32G32_SFLOAT);
-}
-
-int ContactTable::first_node(std::size_t object) const {
-  return static_cast<int>((sets_ == 1 ? 0 : object) * nodes_of_a_set_);
 }
 
 }  // namespace palpate

@@ -78,11 +78,10 @@ class ContactTable {
 
   const gpu::Buffer& nodes() const { return nodes_; }
   /// Index of the first node of an object's numbers.
-  int first_node(std::size_t object) const;
+  int first_node(std::size_t object) const { return static_cast<int>(object * nodes_of_a_set_); }
 
  private:
-  std::size_t sets_ = 1;
-  std::size_t nodes_of_a_set_ = 0;
+  std::size_t nodes_of_a_set_ = 0;  ///< 0 where all objects share the numbers
   gpu::Buffer nodes_;
 };
 

@@ -248,27 +248,30 @@ void CommandStream::run_recorded() {
 double CommandStream::execute() {
   const VkDevice device = context_.device();
   const VkFence fence = fence_.get();
-  const auto doing = fmt::format("running on device '{}'", context_.name());
+  const auto require = [this](VkResult result) {
+    if (result != VK_SUCCESS) {  // no message is made while all goes well
+      check(result, fmt::format("running on device '{}'", context_.name()));
+    }
+  };
   barrier_to_host(commands_);
   if (timestamps_) {
     vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_.get(), 1);
   }
-  check(vkEndCommandBuffer(commands_), doing);
-  check(vkResetFences(device, 1, &fence), doing);
+  require(vkEndCommandBuffer(commands_));
+  require(vkResetFences(device, 1, &fence));
   const VkSubmitInfo submit{.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
                             .commandBufferCount = 1,
                             .pCommandBuffers = &commands_};
   const auto start = std::chrono::steady_clock::now();
-  check(context_.submit(submit, fence), doing);
-  check(vkWaitForFences(device, 1, &fence, VK_TRUE, std::numeric_limits<std::uint64_t>::max()),
-        doing);
+  require(context_.submit(submit, fence));
+  require(vkWaitForFences(device, 1, &fence, VK_TRUE, std::numeric_limits<std::uint64_t>::max()));
   if (!timestamps_) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
   std::array<std::uint64_t, 2> ticks{};
-  check(vkGetQueryPoolResults(device, timestamps_.get(), 0, 2, sizeof ticks, ticks.data(),
-                              sizeof ticks[0], VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
-        doing);
+  require(vkGetQueryPoolResults(device, timestamps_.get(), 0, 2, sizeof ticks, ticks.data(),
+                                sizeof ticks[0],
+                                VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT));
   return static_cast<double>((ticks[1] - ticks[0]) & context_.limits().timestamp_mask) *
          context_.limits().timestamp_ns * 1e-9;
 }

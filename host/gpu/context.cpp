@@ -267,8 +267,7 @@ Device Device::open(std::string_view name_or_index) {
 
 Device Device::share(const VulkanDevice& device) { return Device(new gpu::Context(device)); }
 
-Device::Device(gpu::Context* context) : context_(context) {}
-void Device::Deleter::operator()(gpu::Context* context) const { delete_here(context); }
+Device::Device(gpu::Context* context) : context_(context, delete_here<gpu::Context>) {}
 
 const std::string& Device::name() const { return held_by(context_, "device").name(); }
 std::uint64_t Device::memory_bytes() const { return held_by(context_, "device").limits().memory; }

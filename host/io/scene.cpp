@@ -1,4 +1,4 @@
-#include "palpate/scene.hpp"
+#include "palpate/files.hpp"
 
 #include <fstream>
 #include <optional>

@@ -6,7 +6,7 @@
 
 #include "io/input_file.hpp"
 #include "options/option.hpp"
-#include "palpate/object_frame.hpp"
+#include "palpate/occupancy_grid.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate {

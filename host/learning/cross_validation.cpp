@@ -271,7 +271,7 @@ class FoldTrial {
       }
       // Touches of several groups together would hide by how much each is off.
       for (const auto& [group, touches] : of_group) {
-        std::ranges::move(place_errors(touches, hypotheses_[maps_of_[label].front()], contact, 0),
+        std::ranges::move(place_errors(touches, hypotheses_[maps_of_[label].front()], contact),
                           std::back_inserter(errors));
       }
     }

@@ -16,9 +16,8 @@
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "options/option.hpp"
-#include "options/refused_option.hpp"
 #include "palpate/files.hpp"
-#include "palpate/object_frame.hpp"
+#include "palpate/occupancy_grid.hpp"
 #include "recognition/request.hpp"
 
 namespace palpate {

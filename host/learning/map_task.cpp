@@ -19,7 +19,7 @@
 #include "learning/touch_alignment.hpp"
 #include "model/angle_unit.hpp"
 #include "model/element_spacing.hpp"
-#include "options/refused_option.hpp"
+#include "options/option.hpp"
 #include "palpate/error.hpp"
 #include "recognition/recordings.hpp"
 

@@ -10,12 +10,10 @@
 
 #include "options/request.hpp"
 #include "palpate/device.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
-#include "palpate/rotational_symmetry.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {

@@ -13,7 +13,7 @@
 
 #include "learning/plane_sums.hpp"
 #include "model/bounding_box.hpp"
-#include "model/contact_readings.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

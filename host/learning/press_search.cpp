@@ -9,8 +9,8 @@
 
 #include "learning/press_placement.hpp"
 #include "model/bounding_box.hpp"
-#include "model/contact_readings.hpp"
 #include "model/map_likelihood.hpp"
+#include "model/touch_evidence.hpp"
 
 namespace palpate {
 

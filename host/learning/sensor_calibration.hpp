@@ -11,7 +11,6 @@
 #include "palpate/device.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "palpate/setup_finding.hpp"
 #include "palpate/touch.hpp"
 #include "recognition/request.hpp"
 

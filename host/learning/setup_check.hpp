@@ -9,7 +9,6 @@
 #include <glm/vec2.hpp>
 
 #include "palpate/map_builder.hpp"
-#include "palpate/setup_finding.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {

@@ -10,7 +10,7 @@
 #include "learning/local_search.hpp"
 #include "learning/progress.hpp"
 #include "model/bounding_box.hpp"
-#include "model/interpolated_map.hpp"
+#include "model/map_likelihood.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -13,7 +13,6 @@
 #include "palpate/contact_model.hpp"
 #include "palpate/learned_sensor.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "palpate/reading_layer.hpp"
 
 namespace palpate {
 

@@ -8,8 +8,8 @@
 
 #include "model/cell_range.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/map_builder.hpp"
+#include "palpate/pose.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "palpate/contact_model.hpp"
+#include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "palpate/reading_layer.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "model/contact_readings.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -40,37 +40,6 @@ void require_sound(const Touch& touch) {
                               i));
     }
   }
-}
-
-/// ContactClassifier::classify() in the memory of `reuse`.
-std::vector<Reading> classes_of(const Touch& touch, const ContactClassifier& classifier,
-                                std::vector<Reading> reuse) {
-  classifier.validate();
-  require_sound(touch);
-  const double threshold = classifier.threshold;
-  const double ratio = classifier.ratio;
-  const std::size_t e = touch.pressure.size();
-  double largest = -std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < e; ++i) {
-    if (is_alive(touch, i)) {
-      largest = std::max(largest, touch.pressure[i]);
-    }
-  }
-
-  std::vector<Reading> readings = std::move(reuse);
-  readings.assign(e, Reading::unknown);
-  for (std::size_t i = 0; i < e; ++i) {
-    if (!is_alive(touch, i)) {
-      continue;
-    }
-    const double pressure = touch.pressure[i];
-    if (pressure > threshold && pressure > ratio * largest) {
-      readings[i] = Reading::in_contact;
-    } else if (pressure < threshold && pressure < ratio * largest) {
-      readings[i] = Reading::no_contact;
-    }
-  }
-  return readings;
 }
 
 /// log(1 / (1 + exp(-l))), exact where the logistic function itself would underflow.
@@ -140,7 +109,7 @@ void ContactClassifier::validate() const {
 }
 
 std::vector<Reading> ContactClassifier::classify(const Touch& touch) const {
-  return classes_of(touch, *this, {});
+  return palpate::classify(touch, {.classifier = *this}, {});
 }
 
 std::vector<ElementReading> known_readings(const Touch& touch,
@@ -225,14 +194,32 @@ std::vector<Reading> ContactModel::classify(const Touch& touch) const {
 
 std::vector<Reading> classify(const Touch& touch, const ContactModel& model,
                               std::vector<Reading> reuse) {
-  std::vector<Reading> readings = classes_of(touch, model.classifier, std::move(reuse));
+  model.classifier.validate();
+  require_sound(touch);
+  const auto& [threshold, ratio] = model.classifier;
+  const std::size_t e = touch.pressure.size();
+  double largest = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < e; ++i) {
+    if (is_alive(touch, i)) {
+      largest = std::max(largest, touch.pressure[i]);
+    }
+  }
+  std::span<const double> edges;
   if (model.table) {
-    const std::vector<double>& edges = model.table->level_edges;
-    for (std::size_t i = 0; i < readings.size(); ++i) {
-      if (readings[i] == Reading::in_contact) {
-        const auto reached = std::upper_bound(edges.begin(), edges.end(), touch.pressure[i]);
-        readings[i] = contact_level(static_cast<std::size_t>(reached - edges.begin()));
-      }
+    edges = model.table->level_edges;
+  }
+  std::vector<Reading> readings = std::move(reuse);
+  readings.assign(e, Reading::unknown);
+  for (std::size_t i = 0; i < e; ++i) {
+    const double pressure = touch.pressure[i];
+    if (!is_alive(touch, i)) {
+      continue;
+    }
+    if (pressure > threshold && pressure > ratio * largest) {
+      const auto reached = std::ranges::upper_bound(edges, pressure);
+      readings[i] = contact_level(static_cast<std::size_t>(reached - edges.begin()));
+    } else if (pressure < threshold && pressure < ratio * largest) {
+      readings[i] = Reading::no_contact;
     }
   }
   return readings;

@@ -6,7 +6,6 @@
 #include <glm/vec2.hpp>
 
 #include "model/random.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/pose.hpp"
 
 namespace palpate {

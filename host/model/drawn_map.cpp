@@ -11,7 +11,7 @@
 #include "model/cell_range.hpp"
 #include "palpate/error.hpp"
 #include "palpate/map_builder.hpp"
-#include "palpate/rotational_symmetry.hpp"
+#include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
 
@@ -43,20 +43,10 @@ void require_sound(const std::string& label, const Mask& mask) {
 /// The outermost corners of the occupied pixels.
 BoundingBox occupied_box(const Mask& mask) {
   BoundingBox box;
-  for (std::size_t row = 0; row < mask.rows; ++row) {
-    const auto* begin = mask.occupied.data() + row * mask.columns;
-    const auto* end = begin + mask.columns;
-    const auto* first = std::find_if(begin, end, [](std::uint8_t pixel) { return pixel != 0; });
-    if (first == end) {
-      continue;
-    }
-    const auto* last = end - 1;
-    while (*last == 0) {
-      --last;
-    }
-    for (const auto* pixel : {first, last}) {
+  for (std::size_t pixel = 0; pixel < mask.occupied.size(); ++pixel) {
+    if (mask.occupied[pixel] != 0) {
       const glm::dvec2 centre =
-          mask.origin_mm + mask.pixel_mm * glm::dvec2(pixel - begin, static_cast<double>(row));
+          mask.origin_mm + mask.pixel_mm * glm::dvec2(pixel % mask.columns, pixel / mask.columns);
       box.take_in(centre - mask.pixel_mm / 2.0);
       box.take_in(centre + mask.pixel_mm / 2.0);
     }

@@ -8,7 +8,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "palpate/sensor_model.hpp"
+#include "palpate/map_builder.hpp"
 
 namespace palpate {
 

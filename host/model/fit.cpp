@@ -114,12 +114,6 @@ FitScale pooled(std::span<const FitScale> objects) {
 
 std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
                           const OccupancyGrid& map, const ContactModel& contact,
-                          std::size_t object) {
-  return fit_of(touches, T_object_robot, map, contact, {}, object);
-}
-
-std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
-                          const OccupancyGrid& map, const ContactModel& contact,
                           const DisplacementSd& touch_sd, std::size_t object) {
   return evidence_fit(evidence_of(touches, contact), T_object_robot, map, contact, touch_sd,
                       object);

@@ -16,7 +16,7 @@
 
 #include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
-#include "palpate/sensor_model.hpp"
+#include "palpate/map_builder.hpp"
 
 namespace palpate {
 

@@ -10,7 +10,6 @@
 
 #include "model/bounding_box.hpp"
 #include "palpate/estimate.hpp"
-#include "palpate/object_frame.hpp"
 #include "palpate/pose_error.hpp"
 
 namespace palpate {
@@ -22,17 +21,6 @@ bool is_length(double mm) { return mm >= least_length_mm && mm <= most_length_mm
 bool is_near(const glm::dvec2& p_mm) {
   return std::abs(p_mm.x) <= farthest_mm && std::abs(p_mm.y) <= farthest_mm;
 }
-
-}  // namespace
-
-double log_odds_from_probability(double p) { return std::log(p) - std::log1p(-p); }
-
-double probability_from_log_odds(double l) {
-  const double z = std::exp(-std::abs(l));
-  return (l >= 0 ? 1.0 : z) / (1.0 + z);
-}
-
-namespace {
 
 /// Why numbers that go with the cells are not sound.
 std::optional<std::string> fault_of_layer(const OccupancyGrid& map, const char* name,
@@ -53,6 +41,13 @@ std::optional<std::string> fault_of_layer(const OccupancyGrid& map, const char* 
 }
 
 }  // namespace
+
+double log_odds_from_probability(double p) { return std::log(p) - std::log1p(-p); }
+
+double probability_from_log_odds(double l) {
+  const double z = std::exp(-std::abs(l));
+  return (l >= 0 ? 1.0 : z) / (1.0 + z);
+}
 
 std::optional<std::string> fault_of(const OccupancyGrid& map) {
   if (auto fault = fault_without_cells(map)) {

@@ -1,4 +1,4 @@
-#include "palpate/reading_layer.hpp"
+#include "palpate/learned_sensor.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -21,63 +21,43 @@ struct Nearest {
 
 /// Along one row or column: replaces each distance by the least sum of one of the line's distances
 /// and the squared steps to it (Felzenszwalb and Huttenlocher, Theory of Computing 8, 2012).
-class DistanceLine {
- public:
-  explicit DistanceLine(int longest)
-      : places_(static_cast<std::size_t>(longest)),
-        ends_(static_cast<std::size_t>(longest) + 1),
-        squared_(static_cast<std::size_t>(longest)),
-        cell_(static_cast<std::size_t>(longest)) {}
-
-  void transform(Nearest& nearest, std::size_t first, std::size_t stride, int count) {
-    constexpr double infinity = std::numeric_limits<double>::infinity();
-    const auto at = [&](int i) { return first + static_cast<std::size_t>(i) * stride; };
-    int parabolas = 0;
-    for (int i = 0; i < count; ++i) {
-      const double height = nearest.squared[at(i)];
-      if (height == infinity) {
-        continue;
+void spread_along(Nearest& nearest, std::size_t first, std::size_t stride, int count) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  struct Parabola {
+    int place;
+    double from;  ///< where on the line it becomes the least
+    double squared;
+    std::int64_t cell;
+  };
+  const auto at = [&](int i) { return first + static_cast<std::size_t>(i) * stride; };
+  std::vector<Parabola> least;
+  for (int i = 0; i < count; ++i) {
+    const double height = nearest.squared[at(i)];
+    if (height == infinity) {
+      continue;
+    }
+    double from = -infinity;
+    while (!least.empty()) {
+      const auto& [other, other_from, other_height, cell] = least.back();
+      from =
+          ((height + double(i) * i) - (other_height + double(other) * other)) / (2.0 * (i - other));
+      if (from > other_from) {
+        break;
       }
-      double from = -infinity;
-      while (parabolas > 0) {
-        const int other = places_[static_cast<std::size_t>(parabolas) - 1];
-        from = ((height + double(i) * i) - (nearest.squared[at(other)] + double(other) * other)) /
-               (2.0 * (i - other));
-        if (from > ends_[static_cast<std::size_t>(parabolas) - 1]) {
-          break;
-        }
-        --parabolas;
-        from = -infinity;
-      }
-      places_[static_cast<std::size_t>(parabolas)] = i;
-      ends_[static_cast<std::size_t>(parabolas)] = from;
-      ++parabolas;
+      least.pop_back();
+      from = -infinity;
     }
-    if (parabolas == 0) {
-      return;
-    }
-    int k = 0;
-    for (int i = 0; i < count; ++i) {
-      while (k + 1 < parabolas && ends_[static_cast<std::size_t>(k) + 1] < i) {
-        ++k;
-      }
-      const int place = places_[static_cast<std::size_t>(k)];
-      squared_[static_cast<std::size_t>(i)] =
-          nearest.squared[at(place)] + double(i - place) * (i - place);
-      cell_[static_cast<std::size_t>(i)] = nearest.cell[at(place)];
-    }
-    for (int i = 0; i < count; ++i) {
-      nearest.squared[at(i)] = squared_[static_cast<std::size_t>(i)];
-      nearest.cell[at(i)] = cell_[static_cast<std::size_t>(i)];
-    }
+    least.push_back({i, from, height, nearest.cell[at(i)]});
   }
-
- private:
-  std::vector<int> places_;
-  std::vector<double> ends_;
-  std::vector<double> squared_;
-  std::vector<std::int64_t> cell_;
-};
+  std::size_t k = 0;
+  for (int i = 0; i < count && !least.empty(); ++i) {
+    while (k + 1 < least.size() && least[k + 1].from < i) {
+      ++k;
+    }
+    nearest.squared[at(i)] = least[k].squared + double(i - least[k].place) * (i - least[k].place);
+    nearest.cell[at(i)] = least[k].cell;
+  }
+}
 
 double value_of_level(double level, const ReadingLayer& settings) {
   const double share = std::log1p(level / settings.unit_level) /
@@ -146,12 +126,11 @@ OccupancyGrid reading_layer(const OccupancyGrid& map, const ReadingLayer& settin
       }
     }
   }
-  DistanceLine line(std::max(layer.nx, layer.ny));
   for (std::int64_t j = 0; j < ny; ++j) {
-    line.transform(nearest, static_cast<std::size_t>(j * nx), 1, layer.nx);
+    spread_along(nearest, static_cast<std::size_t>(j * nx), 1, layer.nx);
   }
   for (std::int64_t i = 0; i < nx; ++i) {
-    line.transform(nearest, static_cast<std::size_t>(i), static_cast<std::size_t>(nx), layer.ny);
+    spread_along(nearest, static_cast<std::size_t>(i), static_cast<std::size_t>(nx), layer.ny);
   }
   const auto squared = [&](double mm) { return mm * mm / (map.cell_mm * map.cell_mm); };
   for (std::size_t at = 0; at < cells; ++at) {

@@ -1,4 +1,4 @@
-#include "palpate/rotational_symmetry.hpp"
+#include "palpate/occupancy_grid.hpp"
 
 #include <algorithm>
 #include <cmath>

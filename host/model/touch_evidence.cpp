@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "model/bounding_box.hpp"
-#include "model/contact_readings.hpp"
 
 namespace palpate {
 

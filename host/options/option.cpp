@@ -14,7 +14,6 @@
 #include <fmt/ranges.h>
 
 #include "model/number_text.hpp"
-#include "options/refused_option.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "palpate/balanced_lattice.hpp"
+#include "palpate/files.hpp"
 #include "palpate/particle_filter.hpp"
-#include "palpate/scene.hpp"
 
 namespace palpate {
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "model/body_spread.hpp"
+
 namespace palpate {
 
 namespace {
@@ -203,8 +205,6 @@ LatticePlace variances_of(const RefinedPose& refined, const PoseLattice& lattice
   };
   return {variance(0), variance(1), c[8]};
 }
-
-double spin_mm(const Body& body) { return std::sqrt(std::max(body.inertia_mm2, 1e-12)); }
 
 BeliefPeaks peaks_of(const BinnedObject& of, std::span<const BinShare> bins,
                      std::span<const AxisIndices> at) {

@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "estimation/pose_draws.hpp"
 #include "model/random.hpp"
 
 namespace palpate {

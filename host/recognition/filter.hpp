@@ -14,9 +14,9 @@
 #include "palpate/bounded_posterior.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/device.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/particle_filter.hpp"
+#include "palpate/pose.hpp"
 #include "palpate/pose_histogram.hpp"
 
 namespace palpate {

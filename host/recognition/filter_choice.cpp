@@ -11,7 +11,6 @@
 #include "estimation/bounded/search_memory.hpp"
 #include "estimation/displacement_weights.hpp"
 #include "options/option.hpp"
-#include "options/refused_option.hpp"
 
 namespace palpate {
 

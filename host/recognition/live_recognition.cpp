@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
-#include "palpate/baseline.hpp"
 #include "palpate/pose_track.hpp"
+#include "palpate/sensor.hpp"
 
 namespace palpate {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "palpate/displacement.hpp"
+#include "palpate/pose.hpp"
 #include "recognition/recogniser.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/recognition_task.hpp"

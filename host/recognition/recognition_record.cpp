@@ -12,7 +12,7 @@
 
 #include "estimation/lattice/refinement.hpp"
 #include "palpate/error.hpp"
-#include "palpate/object_frame.hpp"
+#include "palpate/occupancy_grid.hpp"
 #include "palpate/pose_error.hpp"
 #include "recognition/decision.hpp"
 #include "recognition/label_probability.hpp"

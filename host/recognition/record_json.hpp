@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "model/option_words.hpp"
-#include "palpate/setup_finding.hpp"
+#include "palpate/touch.hpp"
 #include "recognition/evaluation.hpp"
 #include "recognition/judged_results.hpp"
 #include "recognition/live_recognition.hpp"

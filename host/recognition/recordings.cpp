@@ -9,7 +9,6 @@
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
 #include "options/option.hpp"
-#include "options/refused_option.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate {

@@ -10,7 +10,6 @@
 
 #include "io/input_file.hpp"
 #include "options/option.hpp"
-#include "options/refused_option.hpp"
 #include "palpate/files.hpp"
 
 namespace palpate {

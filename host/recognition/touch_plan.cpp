@@ -14,7 +14,7 @@
 #include "io/pose_table.hpp"
 #include "io/recording_rules.hpp"
 #include "model/bounding_box.hpp"
-#include "options/refused_option.hpp"
+#include "options/option.hpp"
 #include "palpate/files.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/touch.hpp"

@@ -11,7 +11,6 @@
 #include <glm/vec2.hpp>
 
 #include "palpate/estimate.hpp"
-#include "palpate/plan.hpp"
 #include "palpate/pose.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/recognition_task.hpp"

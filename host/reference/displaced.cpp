@@ -7,6 +7,8 @@
 #include <numbers>
 #include <utility>
 
+#include <glm/common.hpp>
+
 namespace palpate::reference {
 
 namespace {
@@ -195,18 +197,16 @@ bool overlaps(const Touch& touch, const Pose& T_object_robot, const OccupancyGri
     for (int i = 0; i < map.nx; ++i) {
       if (!any || map.log_odds[static_cast<std::size_t>(j) * map.nx + i] > 0.0F) {
         const glm::dvec2 centre = map.origin_mm + map.cell_mm * glm::dvec2(i, j);
-        low = {std::min(low.x, centre.x - map.cell_mm / 2.0),
-               std::min(low.y, centre.y - map.cell_mm / 2.0)};
-        high = {std::max(high.x, centre.x + map.cell_mm / 2.0),
-                std::max(high.y, centre.y + map.cell_mm / 2.0)};
+        low = glm::min(low, centre - map.cell_mm / 2.0);
+        high = glm::max(high, centre + map.cell_mm / 2.0);
       }
     }
   }
   glm::dvec2 first = touch.elements_mm.front();
   glm::dvec2 last = first;
   for (const glm::dvec2& element : touch.elements_mm) {
-    first = {std::min(first.x, element.x), std::min(first.y, element.y)};
-    last = {std::max(last.x, element.x), std::max(last.y, element.y)};
+    first = glm::min(first, element);
+    last = glm::max(last, element);
   }
   const glm::dvec2 array_centre =
       transform(T_object_robot, transform(touch.T_robot_sensor, (first + last) / 2.0));

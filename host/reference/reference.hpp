@@ -9,14 +9,13 @@
 #include <glm/vec2.hpp>
 
 #include "palpate/contact_model.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/fit.hpp"
 #include "palpate/lattice.hpp"
+#include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/pose_error.hpp"
-#include "palpate/sensor_model.hpp"
 #include "palpate/touch.hpp"
 
 /// The method of Pezzementi, Reyda and Hager (ICRA 2011) in plain float64 and in the paper's order.

@@ -1,4 +1,4 @@
-#include "palpate/baseline.hpp"
+#include "palpate/sensor.hpp"
 
 #include <algorithm>
 

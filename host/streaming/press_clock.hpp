@@ -5,7 +5,7 @@
 #include <span>
 
 #include "palpate/pose.hpp"
-#include "palpate/setup_finding.hpp"
+#include "palpate/touch.hpp"
 
 namespace palpate {
 

@@ -7,7 +7,6 @@
 
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "palpate/plan.hpp"
 #include "palpate/touch.hpp"
 #include "types.hpp"
 

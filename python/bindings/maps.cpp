@@ -10,10 +10,8 @@
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"
-#include "palpate/object_frame.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose_error.hpp"
-#include "palpate/rotational_symmetry.hpp"
 #include "shared.hpp"
 #include "touches.hpp"
 

@@ -8,9 +8,8 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/displacement.hpp"
+#include "palpate/map_builder.hpp"
 #include "palpate/pose.hpp"
-#include "palpate/sensor_model.hpp"
 
 namespace palpate::python {
 

@@ -15,7 +15,6 @@
 #include "bindings.hpp"
 #include "model/option_words.hpp"
 #include "options/option.hpp"
-#include "options/refused_option.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "recognition/recordings.hpp"

@@ -8,7 +8,6 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
-#include "palpate/baseline.hpp"
 #include "palpate/driver.hpp"
 #include "palpate/pose_track.hpp"
 #include "palpate/sensor.hpp"

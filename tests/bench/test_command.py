@@ -74,14 +74,6 @@ def test_kernels_keep_their_error_bounds(tmp_path: pathlib.Path) -> None:
     assert cases["latency 25x25x16"]["device, by its clock"] > 0.0
 
 
-@pytest.fixture(scope="module")
-def bounded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What `palpate-bench bounded` says of each part."""
-    document = document_of(tmp_path_factory.mktemp("bounded"), "bounded")
-    cases_of(document)
-    return document
-
-
 def expect_within_tolerance(answers: dict[str, Any]) -> None:
     """The certificates of three answers that had the time they needed."""
     assert len(answers["milliseconds"]) == 3
@@ -89,7 +81,9 @@ def expect_within_tolerance(answers: dict[str, Any]) -> None:
     assert min(answers["bins_evaluated"]) > 0.0
 
 
-def test_bounds_answer_within_the_tolerance_on_any_number_of_threads(bounded: dict[str, Any]) -> None:
+def test_bounds_answer_within_the_tolerance_and_tell_where_they_search(tmp_path: pathlib.Path) -> None:
+    bounded = document_of(tmp_path, "bounded")
+    cases_of(bounded)
     assert len(bounded["speed"]) == 2
     for size in bounded["speed"]:
         for threads in ("all_threads", "one_thread"):
@@ -102,16 +96,10 @@ def test_bounds_answer_within_the_tolerance_on_any_number_of_threads(bounded: di
     for scene in bounded["large"]:
         expect_within_tolerance(scene["answers"])
         assert scene["host_bytes"] > 0
-
-
-def test_bounds_answer_after_every_touch(bounded: dict[str, Any]) -> None:
     assert len(bounded["streaming"]) == 9
     for touch in bounded["streaming"]:
         assert len(touch["milliseconds"]) == 3
         assert all(0.0 <= dropped <= 1.0 for dropped in touch["dropped_mass"]), "also where the budget ends it"
-
-
-def test_bounds_tell_where_they_search(bounded: dict[str, Any]) -> None:
     search = bounded["search"]
     before = search["bins_in_all"]
     assert len(search["stages"]) == 3

@@ -113,14 +113,10 @@ def test_search_becomes_a_picture(bounded: Program, tmp_path: pathlib.Path) -> N
     expect_refused(partial, "holds no search")
 
 
-@pytest.fixture(scope="module")
-def sweep(tmp_path_factory: pytest.TempPathFactory) -> Program:
+def test_a_sweep_is_whole_and_in_order(tmp_path: pathlib.Path) -> None:
     # Takes some ten seconds of a processor, for every filter, lattices and their limits.
-    folder = tmp_path_factory.mktemp("sweep")
-    return Program(folder, "bench.sweep", "--quick", "--trials", 1, "--plots", folder / "plots")
-
-
-def test_a_sweep_is_whole_and_in_order(sweep: Program) -> None:
+    sweep = Program(tmp_path, "bench.sweep", "--quick", "--trials", 1, "--plots", tmp_path / "plots")
+    sweep.expect_charts("sweep_front", "sweep_bins", "sweep_bounds")
     document = sweep.document
     assert {point["filter"] for point in document["points"]} == {
         "histogram", "particles", "systematic", "augmented",
@@ -160,7 +156,3 @@ def test_set_ups_are_checked(tmp_path: pathlib.Path, small: pytest.MonkeyPatch) 
     assert (row["elements"], row["sets"], row["sound"], row["order"], row["one_angle"]) == (36, 1, 1, 1, 1)
     assert (row["offset"], row["mount"], row["beyond"]) == (1, 1, 5)
     assert row["least_order_nats"] > 100 and row["most_mm"] < 0.5 and row["most_rad"] < 0.05
-
-
-def test_the_sweep_draws_its_charts(sweep: Program) -> None:
-    sweep.expect_charts("sweep_front", "sweep_bins", "sweep_bounds")

@@ -8,7 +8,7 @@
 
 #include "io/file_parts.hpp"
 #include "letter_files.hpp"
-#include "support/sanitized.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::bad_input_test {
 

@@ -9,7 +9,7 @@
 #include "letter_files.hpp"
 #include "model/element_spacing.hpp"
 #include "palpate/map_builder.hpp"
-#include "palpate/object_frame.hpp"
+#include "palpate/occupancy_grid.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/simulation.hpp"
 

@@ -78,11 +78,16 @@ class Plan(PreparedTest):
         # A letter of 25 mm about 4 mm from the robot's origin.
         self.assertLess(max(math.hypot(each["x_mm"], each["y_mm"]) for each in ranked), 40)
 
-    def test_prints_the_ten_best(self) -> None:
+    def test_prints_the_ten_best_with_the_gain_of_its_goal_once(self) -> None:
         text = self.text("grid")
         self.assert_named(text, "touch next at x ", "gain nats", "\n  10  ")
         self.assertNotIn("\n  11  ", text)
         self.assertEqual(text[text.index("rank") :].count("+"), 11, "standard errors")
+        for goal in ("identity", "pose"):
+            text = self.text("one.csv", "--goal", goal)
+            heading = text[text.index("rank") :].splitlines()[0]
+            self.assertEqual((heading.count(goal), heading.count(f"{goal} nats")), (1, 1))
+            self.assertIn(", 1 candidate in ", text)
 
     def test_says_what_recognize_says_of_the_touches(self) -> None:
         few = ("u.h5", "--maps", "maps", "--bins=6x6x4")
@@ -112,13 +117,6 @@ class Plan(PreparedTest):
         ranked = self.plan("c.csv", "--goal=identity")["candidates"]
         self.assert_ranked(ranked, "both")
         self.assertEqual(ranked[-1]["index"], 0, "400 mm away")
-
-    def test_shows_the_gain_of_its_goal_once(self) -> None:
-        for goal in ("identity", "pose"):
-            text = self.text("one.csv", "--goal", goal)
-            heading = text[text.index("rank") :].splitlines()[0]
-            self.assertEqual((heading.count(goal), heading.count(f"{goal} nats")), (1, 1))
-            self.assertIn(", 1 candidate in ", text)
 
     def test_says_what_one_touch_and_the_lattice_cannot_tell(self) -> None:
         note = "one touch cannot tell"

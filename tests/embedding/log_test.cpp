@@ -53,20 +53,6 @@ TEST(Log, TellsWhatADestructorCouldNotThrow) {
   log.expect_one(LogLevel::error, "frames.h5");
 }
 
-TEST(Library, PrintsNothing) {
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
-  Device device = Device::open();
-  PoseHistogram belief(device, letter_maps(device), {.lattice = small_lattice()});
-  belief.update(unknown_letter(3).touch(0));
-  belief.refine(belief.estimate().mode);
-  EXPECT_THROW(read_recording("/nonexistent.h5"), Error);
-  EXPECT_THROW(read_map("/dev/null"), Error);
-  EXPECT_THROW(Device::open("no such device"), Error);
-  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-}
-
 TEST(LibraryDeathTest, AMessageOfValidationEndsTheProgramAndIsLogged) {
   testing::GTEST_FLAG(death_test_style) = "threadsafe";
   EXPECT_DEATH(

@@ -62,25 +62,11 @@ std::vector<double> identity_on(Device& device, const std::vector<Hypothesis>& m
   return belief.estimate().identity;
 }
 
-TEST(SharedDevice, GivesTheSameResultAsOneThatPalpateOpens) {
+TEST(SharedDevice, GivesTheResultOfItsOwnAndTakesTurnsWithTheProgramOnItsQueue) {
   Device own = Device::open();
   const std::vector<Hypothesis> maps = letter_maps(own);
   const std::vector<double> expected = identity_on(own, maps);
   Program program;
-  for (int i = 0; i < 2; ++i) {  // the program's device outlives Palpate's use of it
-    Device shared = Device::share(program.handles());
-    EXPECT_EQ(shared.name(), own.name());
-    EXPECT_EQ(letter_maps(shared)[0].map.log_odds, maps[0].map.log_odds);
-    EXPECT_EQ(identity_on(shared, maps), expected);
-  }
-  EXPECT_EQ(program.submit_nothing(), VK_SUCCESS);
-  EXPECT_EQ(program.wait(), VK_SUCCESS);
-}
-
-TEST(SharedDevice, TakesTurnsWithTheProgramOnItsQueue) {
-  Program program;
-  Device shared = Device::share(program.handles());
-  const std::vector<Hypothesis> maps = letter_maps(shared);
   std::atomic<bool> done = false;
   int submissions = 0;
   std::jthread other([&] {  // the validation layer would report two threads in the queue
@@ -90,12 +76,16 @@ TEST(SharedDevice, TakesTurnsWithTheProgramOnItsQueue) {
       std::this_thread::yield();  // lets Palpate have its turn
     } while (!done);
   });
-  for (int i = 0; i < 5; ++i) {
-    identity_on(shared, maps);
+  for (int i = 0; i < 2; ++i) {  // the program's device outlives Palpate's use of it
+    Device shared = Device::share(program.handles());
+    EXPECT_EQ(shared.name(), own.name());
+    EXPECT_EQ(letter_maps(shared)[0].map.log_odds, maps[0].map.log_odds);
+    EXPECT_EQ(identity_on(shared, maps), expected);
   }
   done = true;
   other.join();
   EXPECT_GT(submissions, 0);
+  EXPECT_EQ(program.wait(), VK_SUCCESS);
 }
 
 TEST(SharedDevice, RefusesHandlesThatCannotCompute) {

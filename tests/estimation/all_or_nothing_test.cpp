@@ -139,13 +139,4 @@ TYPED_TEST(MovedPivot, MakesAFilterWhatItIsWithThePivotFromTheStart) {
   }
 }
 
-TEST(MovedLattice, IsThatOfAHistogramAndOfItsMarginals) {
-  const glm::dvec2 pivot_mm{400.0, 200.0};
-  Device device = Device::open();
-  PoseHistogram histogram(device, three_objects(), {.lattice = small_lattice()});
-  histogram.move_pivot(pivot_mm);
-  EXPECT_EQ(histogram.lattice().pivot_mm, pivot_mm);
-  EXPECT_EQ(histogram.marginals(1).grid.pivot_mm, pivot_mm);
-}
-
 }  // namespace palpate::all_or_nothing_test

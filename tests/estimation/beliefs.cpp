@@ -7,19 +7,6 @@
 
 namespace palpate {
 
-namespace {
-
-double log_sum(std::span<const double> logs) {
-  const double most = *std::ranges::max_element(logs);
-  double sum = 0.0;
-  for (const double l : logs) {
-    sum += std::exp(l - most);
-  }
-  return most + std::log(sum);
-}
-
-}  // namespace
-
 std::vector<Hypothesis> three_objects() {
   return {{random_map(31, 27, 0.5, 4.0, 81), 1.0},
           {random_map(25, 25, 0.3, 4.0, 82), 2.0},

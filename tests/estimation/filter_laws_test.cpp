@@ -11,7 +11,6 @@
 #include <gtest/gtest.h>
 
 #include "beliefs.hpp"
-#include "estimation/lattice/refinement.hpp"
 #include "likelihood_cases.hpp"
 #include "palpate/error.hpp"
 #include "support/limits.hpp"
@@ -65,37 +64,6 @@ void expect_the_same_however_updated(Filter& filter, const std::vector<Touch>& t
   filter.reset();
   filter.update(touches);
   EXPECT_TRUE(told_by(filter) == at_once) << "after an update that was broken off";
-}
-
-/// Expects the pose refined around the first, a middle and the last bin of the last object to be
-/// that of the expected bins.
-void expect_refined(const PoseHistogram& histogram, std::span<const Hypothesis> objects,
-                    const reference::Posterior& expected, double nats) {
-  const PoseLattice& lattice = histogram.lattice();
-  const auto in_boxes = [&](std::span<const BinBox> boxes) {
-    std::vector<double> values;
-    for (const BinBox& box : boxes) {
-      for (std::int64_t i = 0; i < box.bins(); ++i) {
-        values.push_back(expected.log_likelihood.back()[box.bin(i, lattice)]);
-      }
-    }
-    return values;
-  };
-  Mode mode{.object = static_cast<int>(objects.size()) - 1};
-  const std::int64_t n = lattice.bins();
-  for (const std::int64_t bin : {std::int64_t{0}, n / 2, n - 1}) {
-    mode.bin = bin;
-    const RefinedPose a = histogram.refine(mode);
-    const RefinedPose b = refine(in_boxes, lattice, displaced_body(objects.back().map), mode);
-    // 1e-4 nats move a mean within 2.5 mm by at most some 1e-3 mm.
-    const double tolerance = 10.0 * nats;
-    const glm::dvec2 moved =
-        a.T_object_robot * lattice.pivot_mm - b.T_object_robot * lattice.pivot_mm;
-    EXPECT_NEAR(moved.x, 0.0, tolerance) << "bin " << bin;
-    EXPECT_NEAR(moved.y, 0.0, tolerance) << "bin " << bin;
-    EXPECT_NEAR(wrap_angle(a.T_object_robot.theta_rad - b.T_object_robot.theta_rad, two_pi), 0.0,
-                tolerance);
-  }
 }
 
 /// Expects sums over bins to be those of the expected posterior, within so many nats.
@@ -181,7 +149,6 @@ TEST_P(HistogramLaws, AgreesWithFloat64) {
     const double nats = allowed_nats(of, expected.log_likelihood);
     EXPECT_LT(likelihood_error(histogram, expected), nats);
     expect_reductions(histogram, expected, nats);
-    expect_refined(histogram, of.objects, expected, nats);
     if (options.none_weight) {
       EXPECT_NEAR(log_odds_of_none(histogram),
                   expected_log_odds_of_none(of.objects, options, touches), nats);

@@ -2,8 +2,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <set>
-#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -14,46 +12,6 @@
 #include "support/synthetic.hpp"
 
 namespace palpate::known_elements_test {
-
-TEST(Gathered, CutsKnownElementsIntoRunsRelativeToThePivot) {
-  constexpr std::size_t longest_run = 5;
-  const Recording recording = random_recording(7, 36, 31);
-  const glm::dvec2 pivot_mm{30.0, -20.0};
-  const KnownElements known =
-      gathered(evidence_of(all_touches(recording), {}), pivot_mm, longest_run);
-  using Element = std::tuple<double, double, Reading>;
-  std::multiset<Element> expected;
-  for (const Touch& touch : all_touches(recording)) {
-    for (const ElementReading& element : known_readings(touch, {})) {
-      const glm::dvec2 from_pivot_mm = element.position_mm - pivot_mm;
-      expected.emplace(from_pivot_mm.x, from_pivot_mm.y, element.reading);
-    }
-  }
-  std::multiset<Element> gathered;
-  std::size_t end = 0;
-  for (const ReadingRun& run : known.runs) {
-    EXPECT_EQ(run.begin, end) << "a gap";
-    EXPECT_GT(run.end, run.begin);
-    EXPECT_LE(run.end - run.begin, longest_run);
-    end = run.end;
-    for (std::size_t k = run.begin; k < run.end; ++k) {
-      const glm::dvec2 from_pivot_mm = known.from_pivot_mm[k];
-      gathered.emplace(from_pivot_mm.x, from_pivot_mm.y, run.reading);
-    }
-  }
-  EXPECT_EQ(end, known.from_pivot_mm.size());
-  EXPECT_EQ(gathered, expected);
-}
-
-TEST(Split, AddsUpToTheCoordinate) {
-  for (const double at : {0.0, 0.25, -0.25, -1.0, 1234.5678, -98765.4321, 1e-20, -1e-20, 3e8}) {
-    const shaders::Split parts = split(at);
-    EXPECT_GE(parts.fraction, 0.0F);
-    EXPECT_LE(parts.fraction, 1.0F);
-    EXPECT_NEAR(parts.cell + static_cast<double>(parts.fraction), at, 6e-8)
-        << "half the last digit of a float32 below 1";
-  }
-}
 
 TEST(Split, FarOutsideNeverMeetsAPlaceOfTheLattice) {
   // No map that a device holds is as wide.
@@ -74,24 +32,6 @@ TEST(Split, FarOutsideNeverMeetsAPlaceOfTheLattice) {
       }
     }
     EXPECT_GE(std::abs(std::int64_t{split(nan).cell} + split_axis(element).cell), widest);
-  }
-}
-
-TEST(RotatedElements, AreAllElementsForEveryThetaInCells) {
-  const std::vector<glm::dvec2> from_pivot_mm{{3.0, 4.0}, {-700.0, 250.0}};
-  const Axis theta_rad{-1.0, 5.0, 3};
-  constexpr double cell_mm = 0.5;
-  const std::vector<shaders::RotatedElement> table =
-      rotated_elements(from_pivot_mm, theta_rad, cell_mm);
-  ASSERT_EQ(table.size(), 6U);
-  for (int t = 0; t < 3; ++t) {
-    for (std::size_t k = 0; k < 2; ++k) {
-      const glm::dvec2 expected =
-          reference::transform({{0.0, 0.0}, theta_rad.centre(t)}, from_pivot_mm[k]) / cell_mm;
-      const auto& [x, y] = table[static_cast<std::size_t>(t) * 2 + k];
-      EXPECT_NEAR(x.cell + static_cast<double>(x.fraction), expected.x, 6e-8) << "float32 below 1";
-      EXPECT_NEAR(y.cell + static_cast<double>(y.fraction), expected.y, 6e-8) << "float32 below 1";
-    }
   }
 }
 

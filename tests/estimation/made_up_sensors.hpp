@@ -5,7 +5,7 @@
 
 #include "palpate/contact_model.hpp"
 #include "palpate/estimate.hpp"
-#include "palpate/reading_layer.hpp"
+#include "palpate/learned_sensor.hpp"
 
 namespace palpate {
 

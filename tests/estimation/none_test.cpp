@@ -29,22 +29,6 @@ class NoneOfThese : public testing::Test {
   const Recording recording = random_recording(3, 36, 165);
 };
 
-TEST_F(NoneOfThese, KeepsTheOddsOfTheWeightsAfterOneTouch) {
-  // The array reaches both objects at every bin, so that a piece explains the touch as well as the
-  // objects do on average.
-  Touch touch = recording.touch(0);
-  touch.T_robot_sensor = {{2.5, -1.0}, 0.4};
-  for (const double weight : {0.01, 1.0, 20.0}) {
-    PoseHistogram histogram = histogram_of(weight);
-    for (int round = 0; round < 2; ++round) {
-      EXPECT_NEAR(histogram.estimate().none, weight / (2.0 + weight), 1e-15) << "before any touch";
-      histogram.update(touch);
-      EXPECT_NEAR(log_odds_of_none(histogram), std::log(weight / 2.0), per_mean);
-      histogram.reset();
-    }
-  }
-}
-
 TEST_F(NoneOfThese, ChangesWithNoTouchOfUnknownElements) {
   // Vulkan's exp(), which the device sums, is exact to a few units of float32's last place.
   constexpr double exp_error = 1e-6;

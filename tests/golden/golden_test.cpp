@@ -12,6 +12,7 @@
 #include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "reference/reference.hpp"
+#include "support/shared_device.hpp"
 #include "support/synthetic.hpp"
 
 namespace palpate::golden_test {
@@ -112,8 +113,7 @@ TEST(GoldenValues, OfAMap) {
   const Recording recording = two_touches();
   const std::vector<Touch> touches = all_touches(recording);
   const MapOptions wanted{.cell_mm = 0.5, .sensor = {.prior = prior}};
-  Device device = Device::open();
-  MapBuilder builder(device, wanted);
+  MapBuilder builder(shared_device(), wanted);
   builder.add(touches);
   const OccupancyGrid map = builder.build("golden");
   const std::vector<double> expected =
@@ -159,8 +159,7 @@ TEST(GoldenValues, OfTheHistogramFilter) {
                                              .pivot_mm = {0.5, -0.25}},
                                  .contact = {.gamma = 0.15, .prior = prior},
                                  .none_weight = 0.7};
-  Device device = Device::open();
-  PoseHistogram histogram(device, objects(), options);
+  PoseHistogram histogram(shared_device(), objects(), options);
   histogram.update(touches);
   const reference::Posterior posterior = reference_posterior(objects(), options, touches);
   std::vector<std::vector<std::vector<double>>> by_touch;
@@ -231,8 +230,7 @@ TEST(GoldenValues, OfParticlesAtOnePose) {
       .motion_mm = 0.0,
       .motion_rad = 0.0};
   const Recording recording = two_touches();
-  Device device = Device::open();
-  ParticleFilter filter(device, objects(), wanted);
+  ParticleFilter filter(shared_device(), objects(), wanted);
   filter.update(recording.touch(0));
   const std::vector<double> identity = filter.estimate().identity;
   EXPECT_NEAR(identity[0], 0.262529213, 2 * per_touch);

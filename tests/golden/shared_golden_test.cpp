@@ -12,6 +12,7 @@
 #include "palpate/map_builder.hpp"
 #include "palpate/pose_error.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "support/shared_device.hpp"
 #include "support/synthetic.hpp"
 
 namespace palpate::shared_golden_test {
@@ -45,15 +46,14 @@ Pose pose_from(const json& j) {
 }
 
 TEST_F(SharedGolden, MapsAgreeInEveryCell) {
-  Device device = Device::open();
   for (const std::string label : {"A", "E", "I", "O", "U"}) {
     const OccupancyGrid expected = read_map(folder / (label + ".map.h5"));
     const Recording training = read_recording(folder / (label + ".train.h5"));
-    MapBuilder builder(device, {.cell_mm = expected.cell_mm,
-                                .sensor = {.spread_mm = golden.at("spread_mm"),
-                                           .peak = golden.at("peak"),
-                                           .prior = golden.at("prior")},
-                                .classifier = classifier()});
+    MapBuilder builder(shared_device(), {.cell_mm = expected.cell_mm,
+                                         .sensor = {.spread_mm = golden.at("spread_mm"),
+                                                    .peak = golden.at("peak"),
+                                                    .prior = golden.at("prior")},
+                                         .classifier = classifier()});
     builder.add(all_touches(training));
     const OccupancyGrid map = builder.build(label);
     const glm::dvec2 offset = (expected.origin_mm - map.origin_mm) / map.cell_mm;
@@ -81,8 +81,7 @@ TEST_F(SharedGolden, RecognitionAgreesInEveryBin) {
                                  .contact = {.classifier = classifier(),
                                              .gamma = golden.at("gamma"),
                                              .prior = golden.at("prior").get<double>()}};
-  Device device = Device::open();
-  PoseHistogram histogram(device, objects, options);
+  PoseHistogram histogram(shared_device(), objects, options);
 
   for (const json& unknown : golden.at("cases")) {
     const std::string file = unknown.at("unknown");

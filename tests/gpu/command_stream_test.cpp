@@ -135,40 +135,26 @@ class Refusal : public Commands {
   const ScaleAndAdd::Push push{8, 0};
 };
 
-TEST_F(Refusal, OfABindingAboveTheDevicesLimit) {
+TEST_F(Refusal, OfBindingsConstantsAndWorkgroupsThatTheKernelOrTheDeviceDoesNotTake) {
+  const auto expect_dispatch_refused = [&](std::initializer_list<const Buffer*> buffers,
+                                           const auto& constants,
+                                           std::array<std::uint32_t, 3> groups, const char* says) {
+    expect_refused([&] { stream.dispatch(triple.kernel(), buffers, constants, groups); }, says);
+  };
+  expect_dispatch_refused({&a}, push, {1, 1, 1}, "scale_and_add: 1 buffers");
+  expect_dispatch_refused({&a, &b}, push.count, {1, 1, 1}, "4 B of constants");
+  for (const std::size_t dimension : {0U, 1U, 2U}) {
+    std::array<std::uint32_t, 3> groups{1, 1, 1};
+    groups[dimension] = context.limits().group_count[dimension] + 1;
+    if (groups[dimension] > 0) {  // else no number of workgroups exceeds this limit
+      expect_dispatch_refused({&a, &b}, push, groups, "workgroups");
+    }
+  }
   Limits small = context.limits();
   small.storage_range = 1024;
   context.lower_limits(small);
   const Buffer large = words_buffer(context, 257);
-  expect_refused([&] { triple.dispatch(stream, large, b, 1); }, "binding 0 of 1028 B");
-}
-
-TEST_F(Refusal, OfTooManyWorkgroups) {
-  const auto& most = context.limits().group_count;
-  for (const std::size_t dimension : {0U, 1U, 2U}) {
-    std::array<std::uint32_t, 3> groups{1, 1, 1};
-    groups[dimension] = most[dimension] + 1;
-    if (groups[dimension] > 0) {  // else no number of workgroups exceeds this limit
-      expect_refused(
-          [&] {
-            stream.dispatch(triple.kernel(), {&a, &b}, push, groups);
-          },
-          "workgroups");
-    }
-  }
-}
-
-TEST_F(Refusal, OfBuffersAndConstantsThatTheKernelDoesNotTake) {
-  expect_refused(
-      [&] {
-        stream.dispatch(triple.kernel(), {&a}, push, {1, 1, 1});
-      },
-      "scale_and_add: 1 buffers");
-  expect_refused(
-      [&] {
-        stream.dispatch(triple.kernel(), {&a, &b}, push.count, {1, 1, 1});
-      },
-      "4 B of constants");
+  expect_dispatch_refused({&large, &b}, push, {1, 1, 1}, "binding 0 of 1028 B");
 }
 
 TEST_F(Refusal, OfATransferThatNoStagingMemoryHolds) {

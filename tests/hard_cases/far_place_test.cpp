@@ -16,12 +16,10 @@ std::vector<Hypothesis> two_objects() {
 constexpr PoseLattice fine_lattice{
     .x_mm = {-1.0, 1.0, 20}, .y_mm = {-0.5, 0.5, 10}, .theta_rad = {0.0, two_pi, 4}};
 
-/// Touches and a lattice of which one is the same as near the origin but for rounding.
 struct FarCase {
   std::string name;
   PoseLattice lattice;
   Recording recording;
-  std::optional<Recording> near;  ///< that fine_lattice sees alike
 };
 
 std::vector<FarCase> far_cases() {
@@ -29,14 +27,13 @@ std::vector<FarCase> far_cases() {
   const Recording near = random_recording(4, 36, 443);
   for (const glm::dvec2 away_mm : {glm::dvec2(1e6, -1e6), glm::dvec2(-1e6, 0.0)}) {
     cases.push_back({"poses 1e6 mm from the robot's origin, with a pivot, in bins of 0.1 mm",
-                     fine_lattice, moved(near, {away_mm, 0.0}), near});
+                     fine_lattice, moved(near, {away_mm, 0.0})});
     cases.back().lattice.pivot_mm = away_mm;
   }
   cases.push_back({"objects 1e6 mm from the robot's origin, without a pivot",
                    {{-1e6 - 1.0, -1e6 + 1.0, 20}, {1e6 - 0.5, 1e6 + 0.5, 10}, {0.0, 0.0, 1}, {}},
-                   moved(random_recording(4, 36, 444), {{1e6, -1e6}, 0.0}),
-                   {}});
-  cases.push_back({"angles of 1e6 turns, of sensor and region", fine_lattice, near, near});
+                   moved(random_recording(4, 36, 444), {{1e6, -1e6}, 0.0})});
+  cases.push_back({"angles of 1e6 turns, of sensor and region", fine_lattice, near});
   cases.back().lattice.theta_rad = {1e6 * two_pi, 1e6 * two_pi + two_pi, 4};
   for (std::size_t i = 0; i < near.size(); ++i) {
     cases.back().recording.T_robot_sensor[i].theta_rad += (i % 2 == 0 ? 1e6 : -1e6) * two_pi;
@@ -46,24 +43,14 @@ std::vector<FarCase> far_cases() {
 
 TEST(FarPlace, IsAsGoodAsTheOrigin) {
   const std::vector<Hypothesis> objects = two_objects();
-  for (const auto& [name, lattice, recording, near] : far_cases()) {
+  for (const auto& [name, lattice, recording] : far_cases()) {
     HardCase hard(name);
     HardCase bounds("bounds: " + name);
-    const std::vector<Touch> touches = all_touches(recording);
-    const Estimate estimate = hard.expect_posterior(objects, {.lattice = lattice}, touches);
+    const Estimate estimate =
+        hard.expect_posterior(objects, {.lattice = lattice}, all_touches(recording));
     EXPECT_GT(std::abs(estimate.mode.log_likelihood), 1.0) << "off the map";
     // 1e-10 mm of 1e6 mm are 2e-10 cells of 12 nats, times 150 elements and turns.
     bounds.expect_laws(objects, HistogramOptions{.lattice = lattice}, recording, 1e-5);
-    if (near) {
-      PoseHistogram at_origin(hard.device(), objects, {.lattice = fine_lattice});
-      at_origin.update(all_touches(*near));
-      PoseHistogram far_away(hard.device(), objects, {.lattice = lattice});
-      far_away.update(touches);
-      EXPECT_EQ(estimate.mode.bin, at_origin.estimate().mode.bin);
-      hard.expect("against the same touches at the origin, nats",
-                  largest_difference(far_away.log_likelihood(0), at_origin.log_likelihood(0)),
-                  1e-5);
-    }
   }
 }
 

@@ -57,13 +57,6 @@ double total(std::span<const double> numbers) {
   return std::accumulate(numbers.begin(), numbers.end(), 0.0);
 }
 
-Device& HardCase::device() {
-  if (!device_) {
-    device_.emplace(Device::open());
-  }
-  return *device_;
-}
-
 HardCase::~HardCase() {
   std::string seen;
   for (const auto& [quantity, largest] : largest_) {
@@ -95,47 +88,43 @@ Estimate HardCase::expect_posterior(std::span<const Hypothesis> objects,
       l *= times;
     }
   }
-  PoseHistogram histogram(device(), objects, options);
+  PoseHistogram histogram(shared_device(), objects, options);
   for (int i = 0; i < times; ++i) {
     histogram.update(touches);
   }
   Estimate estimate = histogram.estimate();
 
-  std::vector<std::vector<double>> bins;
+  reference::Posterior product = expected;
+  const auto log_posterior = [&](const reference::Posterior& posterior, std::size_t object,
+                                 std::size_t bin) {
+    return posterior.log_likelihood[object][bin] + std::log(objects[object].weight);
+  };
   LogSum product_evidence;
   LogSum evidence;
   double top = -std::numeric_limits<double>::infinity();
   for (std::size_t object = 0; object < objects.size(); ++object) {
-    bins.push_back(histogram.log_likelihood(static_cast<int>(object)));
-    EXPECT_TRUE(all_finite(bins.back())) << name_ << ": bins of object " << object;
-    const double log_weight = std::log(objects[object].weight);
-    for (std::size_t bin = 0; bin < bins.back().size(); ++bin) {
-      const double l = expected.log_likelihood[object][bin] + log_weight;
-      product_evidence.add(bins[object][bin] + log_weight);
-      evidence.add(l);
-      top = std::max(top, l);
+    product.log_likelihood[object] = histogram.log_likelihood(static_cast<int>(object));
+    EXPECT_TRUE(all_finite(product.log_likelihood[object])) << name_ << ": object " << object;
+    for (std::size_t bin = 0; bin < product.log_likelihood[object].size(); ++bin) {
+      product_evidence.add(log_posterior(product, object, bin));
+      evidence.add(log_posterior(expected, object, bin));
+      top = std::max(top, log_posterior(expected, object, bin));
     }
   }
-  Largest near_top;
+  const auto allowed_near_top = [&](double log_likelihood) {
+    return allowed.near_top_nats.value_or(2.0 * allowed.at(log_likelihood));
+  };
   for (std::size_t object = 0; object < objects.size(); ++object) {
-    // The bin whose error comes closest to the allowed error, or exceeds it the most.
-    std::optional<Largest> largest;
-    for (std::size_t bin = 0; bin < bins[object].size(); ++bin) {
+    for (std::size_t bin = 0; bin < product.log_likelihood[object].size(); ++bin) {
       const double l = expected.log_likelihood[object][bin];
-      const double error = bins[object][bin] - l;
-      if (!largest || std::abs(error) - allowed.at(l) > largest->error - largest->allowed) {
-        largest = {std::abs(error), allowed.at(l)};
-      }
-      if (l + std::log(objects[object].weight) > top - near_top_nats) {
-        const double of_log_posterior = error - (product_evidence.log() - evidence.log());
-        near_top.error = std::max(near_top.error, std::abs(of_log_posterior));
-        near_top.allowed = std::max(near_top.allowed, 2.0 * allowed.at(l));
+      const double error = product.log_likelihood[object][bin] - l;
+      expect("log-likelihood, nats", std::abs(error), allowed.at(l));
+      if (log_posterior(expected, object, bin) > top - near_top_nats) {
+        expect("log posterior near the top, nats",
+               std::abs(error - (product_evidence.log() - evidence.log())), allowed_near_top(l));
       }
     }
-    expect("log-likelihood, nats", largest->error, largest->allowed);
   }
-  near_top.allowed = allowed.near_top_nats.value_or(near_top.allowed);
-  expect("log posterior near the top, nats", near_top.error, near_top.allowed);
 
   EXPECT_NEAR(total(estimate.identity), 1.0, 1e-12) << name_;
   expect("identity", largest_difference(estimate.identity, reference::identity(expected)),
@@ -143,10 +132,9 @@ Estimate HardCase::expect_posterior(std::span<const Hypothesis> objects,
 
   const auto object = static_cast<std::size_t>(estimate.mode.object);
   const auto bin = static_cast<std::size_t>(estimate.mode.bin.value());
-  EXPECT_EQ(estimate.mode.log_likelihood, bins[object][bin]) << name_;
-  check("mode below the best bin, nats",
-        top - expected.log_likelihood[object][bin] - std::log(objects[object].weight),
-        near_top.allowed);
+  EXPECT_EQ(estimate.mode.log_likelihood, product.log_likelihood[object][bin]) << name_;
+  check("mode below the best bin, nats", top - log_posterior(expected, object, bin),
+        allowed_near_top(expected.log_likelihood[object][bin]));
   const Pose pose = reference::bin_pose(histogram.lattice(), *estimate.mode.bin);
   const glm::dvec2 shift = estimate.mode.T_object_robot.translation_mm - pose.translation_mm;
   EXPECT_LE(std::hypot(shift.x, shift.y), 1e-8) << name_;
@@ -196,7 +184,7 @@ ParticleFilter HardCase::expect_particles(std::span<const Hypothesis> objects,
                                           const ParticleOptions& options,
                                           const Recording& recording, double allowed_nats) {
   SCOPED_TRACE(name_);
-  ParticleFilter filter(device(), objects, options);
+  ParticleFilter filter(shared_device(), objects, options);
   for (const Touch& touch : all_touches(recording)) {
     filter.update(touch);
     const std::vector<ParticleFilter::Particle> particles = filter.particles();
@@ -231,7 +219,7 @@ ParticleFilter HardCase::expect_particles(std::span<const Hypothesis> objects,
 }
 
 OccupancyGrid HardCase::expect_map(std::span<const Touch> touches, const MapOptions& options) {
-  MapBuilder builder(device(), options);
+  MapBuilder builder(shared_device(), options);
   builder.add(touches);
   OccupancyGrid map = builder.build(name_);
   const std::vector<double> cells(map.log_odds.begin(), map.log_odds.end());

@@ -10,8 +10,9 @@
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "support/certified.hpp"
-#include "support/sanitized.hpp"
+#include "support/shared_device.hpp"
 #include "support/synthetic.hpp"
+#include "support/trials.hpp"
 
 namespace palpate {
 
@@ -41,9 +42,6 @@ class HardCase {
 
   /// Expects the error to be allowed, and keeps each quantity's largest error.
   void expect(const std::string& quantity, double error, double allowed);
-
-  /// The device of the case, opened where one is asked for.
-  Device& device();
 
   /// Runs a histogram over the touches, so many times, and expects finite results that agree with
   /// float64, which sums them once: every bin, the posterior near its top, identity, mode,
@@ -83,7 +81,6 @@ class HardCase {
 
   std::string name_;
   std::map<std::string, Largest> largest_;
-  std::optional<Device> device_;
 };
 
 /// 5 x 6 x 4 bins over 10 x 10 mm and all angles.

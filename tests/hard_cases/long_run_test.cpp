@@ -109,7 +109,7 @@ TEST(FiftyMillionBins, OfWhichOneOrAllHoldTheMass) {
   const Hypothesis hypothesis{map, 1.0};
   const HistogramOptions options{.lattice = lattice, .contact = {.gamma = 0.0}};
   const auto bins = static_cast<double>(lattice.bins());
-  PoseHistogram histogram(hard.device(), std::span(&hypothesis, 1), options);
+  PoseHistogram histogram(shared_device(), std::span(&hypothesis, 1), options);
 
   const Recording recording = touch_of_both_ends(chosen, map);
   histogram.update(all_touches(recording));

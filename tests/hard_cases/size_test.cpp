@@ -105,7 +105,7 @@ TEST(Map, PriorsAndPeaksAtTheirEnds) {
   for (const auto& [peak, prior, named] :
        {std::tuple(0.9, 1e-7, "prior"), {0.9, 1.0 - 1e-7, "prior"}, {0.99999, 0.2, "peak"}}) {
     const MapOptions options{.sensor = {.peak = peak, .prior = prior}};
-    expect_named(input_error([&] { MapBuilder(hard.device(), options); }), {named});
+    expect_named(input_error([&] { MapBuilder(shared_device(), options); }), {named});
   }
 }
 

@@ -1,34 +1,14 @@
 #include "io/atomic_file.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <csignal>
 
 #include "file_parts.hpp"
 #include "palpate/files.hpp"
+#include "support/child_process.hpp"
 
 namespace palpate::atomic_file_test {
-
-// For its lifetime, files of this process may not grow beyond the size: a full disk, in small.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit small{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~FullDisk() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
 
 class AtomicFiles : public OneFile {
  protected:
@@ -92,11 +72,13 @@ TEST_F(AtomicFiles, NameTargetsThatTheyCannotBe) {
 TEST_F(AtomicFiles, KeepTheOldOnesWhereTheDiskIsFull) {
   OccupancyGrid map{.nx = 100'000, .ny = 1};
   map.log_odds.assign(100'000, 1.0F);
-  {
-    const FullDisk full(4096);
+  const int status = status_of([&] {
+    std::signal(SIGXFSZ, SIG_IGN);  // errors of writing, not signals
+    limit_process(RLIMIT_FSIZE, 4096);
     expect_named(error_of(Fault::system, [&] { write_map(path_, map); }), {"file.h5", "write"});
     error_of(Fault::system, [&] { write_map_server(folder_ / "a.yaml", map); });
-  }
+  });
+  EXPECT_EQ(status, 0);
   EXPECT_EQ(bytes_of(path_), "old");
   EXPECT_EQ(files(), 1) << "nor one of a pair";
 }

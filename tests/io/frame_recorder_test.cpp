@@ -2,23 +2,19 @@
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <functional>
 #include <random>
-#include <thread>
 
 #include "file_parts.hpp"
 #include "io/recording_state.hpp"
 #include "numbered_frames.hpp"
 #include "palpate/files.hpp"
+#include "support/child_process.hpp"
 #include "support/limits.hpp"
 #include "support/trials.hpp"
 
@@ -71,166 +67,161 @@ TEST_F(FrameRecorderFile, WithoutAKnownReadingIsLostAndWithOneHasTheOthersUnknow
   }
 }
 
+TEST_F(FrameRecorderFile, KeepsWhatItsSensorSaysAndDropsPosesAndTimesThatAreNone) {
+  SensorDescription sensor = sensor_of(1);
+  sensor.name = "caf\xe9";
+  sensor.object = "Ä";
+  sensor.pressure_unit = "raw";
+  sensor.baseline = {-0.0};
+  sensor.truth = {.object = "B", .T_object_robot = {{1.0, 2.0}, 3.0}};
+  FrameRecorder recorder(path_, sensor);
+  recorder.add(frame_of(0, 1));
+  Frame frame = frame_of(1, 1);
+  frame.device_time_s = infinity;
+  for (const Pose& none : {Pose{{nan, 0.0}, 0.0}, Pose{{0.0, infinity}, 0.0}, Pose{{}, nan}}) {
+    frame.T_robot_sensor = none;
+    recorder.add(frame);
+  }
+  frame.host_time_s = nan;
+  recorder.add(frame);
+  EXPECT_EQ(recorder.frames(), 4u);
+  EXPECT_EQ(recorder.lost(), 1u);
+  EXPECT_EQ(recorder.with_pose(), 1u);
+  recorder.close();
+  const Recording read = read_recording(path_);
+  EXPECT_TRUE(read.closed);
+  EXPECT_EQ(read.sensor, "caf?");
+  EXPECT_EQ(read.object, "Ä");
+  EXPECT_EQ(read.pressure_unit, "raw");
+  EXPECT_EQ(read.truth.value().object, "B");
+  EXPECT_EQ(read.truth->T_object_robot.translation_mm, glm::dvec2(1.0, 2.0));
+  EXPECT_EQ(bits_of(read.baseline), bits_of(sensor.baseline));
+  EXPECT_EQ(bits_of(read.device_time_s), bits_of(std::vector{0.0, nan, nan, nan}));
+  const Pose none{{nan, nan}, nan};
+  EXPECT_EQ(bits_of(read.T_robot_sensor),
+            bits_of(std::vector{*frame_of(0, 1).T_robot_sensor, none, none, none}));
+}
+
 TEST_F(FrameRecorderFile, RefusesWhatDoesNotFit) {
   FrameRecorder recorder(path_, sensor_of(2));
   expect_named(input_error([&] { recorder.add(frame_of(0, 3)); }), {"3 values", "2 elements"});
-  SensorDescription sensor = sensor_of(2);
-  sensor.baseline = {1.0};
-  expect_named(refusal([&] { FrameRecorder(path_, sensor); }), {"1 baseline"});
-  expect_named(refusal([&] { FrameRecorder(path_, {}); }), {"0 elements"});
+  using Sensor = SensorDescription;
+  const std::pair<const char*, std::function<void(Sensor&)>> sensors[] = {
+      {"1 baseline", [](Sensor& s) { s.baseline = {1.0}; }},
+      {"1 valid", [](Sensor& s) { s.valid = {1}; }},
+      {"0 elements", [](Sensor& s) { s.elements_mm.clear(); }},
+      {"'elements', position 1", [](Sensor& s) { s.elements_mm[1].x = nan; }},
+      {"'object'", [](Sensor& s) { s.object = "\xff"; }}};
+  for (const auto& [named, spoil] : sensors) {
+    SensorDescription sensor = sensor_of(2);
+    spoil(sensor);
+    expect_named(refusal([&, &sensor = sensor] { FrameRecorder(path_, sensor); }), {named});
+  }
 }
 
 constexpr std::size_t elements = 36;
 
-// What a forked recorder is told, and tells of itself.
-struct Progress {
-  std::atomic<std::size_t> wanted = 0;
-  std::atomic<std::size_t> added = 0;
-  std::atomic<std::size_t> flushed = 0;
-};
-
 // A recorder in a process of its own, which can be killed.
 class FrameRecorderProcess : public FrameRecorderFile {
  protected:
-  FrameRecorderProcess()
-      : progress_(new (::mmap(nullptr, sizeof(Progress), PROT_READ | PROT_WRITE,
-                              MAP_SHARED | MAP_ANONYMOUS, -1, 0)) Progress) {}
-  ~FrameRecorderProcess() override { ::munmap(progress_, sizeof(Progress)); }
+  using Count = std::atomic<std::size_t>;
 
-  // Runs `work` in a process of its own, which must not return to the test.
-  pid_t fork_recorder(const std::function<void()>& work) {
-    new (progress_) Progress;
-    const pid_t pid = ::fork();
-    if (pid == 0) {
-      try {
-        work();
-      } catch (...) {
-        ::_exit(3);
+  // Adds a frame and counts it.
+  void add_next(FrameRecorder& recorder) { recorder.add(frame_of(added_++, elements)); }
+
+  // Expects of recorders in processes of their own that end with this status: the stream's
+  // beginning in the file, where there is one, and all but the last second of what was added.
+  void expect_whole(int runs, int status, const std::function<void()>& record) {
+    int appeared = 0;
+    for (int run = 0; run < runs; ++run) {
+      SCOPED_TRACE(run);
+      random_.discard(4);  // each run has draws of its own
+      EXPECT_EQ(status_of(record), status);
+      std::size_t kept = 0;
+      if (std::filesystem::exists(path_)) {
+        const Recording read = read_recording(path_);
+        expect_prefix(read, elements);
+        kept = read.size();
+        std::filesystem::remove(path_);
+        ++appeared;
       }
-      ::_exit(0);
+      EXPECT_LE(static_cast<double>(added_.exchange(0) - kept) / frame_rate_hz, 1.0);
     }
-    return pid;
+    EXPECT_GE(appeared, runs / 2);  // the first rows are saved after 250 frames
   }
 
-  template <class Condition>
-  static void wait_until(const Condition& condition, pid_t pid) {
-    while (!condition()) {
-      ASSERT_EQ(::waitpid(pid, nullptr, WNOHANG), 0) << "the recorder has ended";
-      std::this_thread::yield();
-    }
-  }
-
-  static int ending(pid_t pid, int signal = 0) {
-    ::kill(pid, signal);
-    int status = 0;
-    ::waitpid(pid, &status, 0);
-    return status;
-  }
-
-  void add_next(FrameRecorder& recorder) {
-    const std::size_t i = progress_->added++;
-    recorder.add(frame_of(i, elements));
-  }
-
-  // Expects the stream's beginning in the file, where there is one, and all but the last second of
-  // what was added. Removes the file and says whether there was one.
-  bool removed_whole() {
-    const bool there = std::filesystem::exists(path_);
-    std::size_t kept = 0;
-    if (there) {
-      const Recording read = read_recording(path_);
-      expect_prefix(read, elements);
-      kept = read.size();
-      std::filesystem::remove(path_);
-    }
-    EXPECT_LE(static_cast<double>(progress_->added - kept) / frame_rate_hz, 1.0);
-    return there;
-  }
-
-  Progress* progress_;
+  std::mt19937_64 random_{20110509};
+  // Of all processes.
+  Count& added_ = *new (::mmap(nullptr, sizeof(Count), PROT_READ | PROT_WRITE,
+                               MAP_SHARED | MAP_ANONYMOUS, -1, 0)) Count(0);
 };
 
 TEST_F(FrameRecorderProcess, FileIsReadAsBeingRecordedFromTheMomentItAppears) {
   for (int run = 0; run < trials(6); ++run) {
     SCOPED_TRACE(run);
-    const pid_t pid = fork_recorder([&] {
+    const pid_t pid = ::fork();
+    if (pid == 0) {
       FrameRecorder recorder(path_, sensor_of(elements));
-      for (progress_->wanted = 1;;) {
-        if (progress_->added < progress_->wanted) {
-          add_next(recorder);
-        } else if (progress_->flushed < progress_->wanted) {
-          recorder.flush();
-          progress_->flushed = progress_->added.load();
-        } else {
-          std::this_thread::sleep_for(std::chrono::microseconds(100));  // leaves the test its time
+      for (const std::size_t frames : {1000u, 3000u}) {
+        while (recorder.frames() < frames) {
+          recorder.add(frame_of(recorder.frames(), elements));
         }
+        recorder.flush();
+        ::raise(SIGSTOP);
       }
-    });
-    wait_until([&] { return ::access(path_.c_str(), F_OK) == 0; }, pid);
+      ::_exit(0);
+    }
+    siginfo_t state{};  // of the process: none while it runs
+    while (!std::filesystem::exists(path_) && state.si_pid == 0) {
+      ::waitid(P_PID, static_cast<id_t>(pid), &state, WSTOPPED | WEXITED | WNOHANG | WNOWAIT);
+    }
     EXPECT_TRUE(is_marked_open(path_));
     EXPECT_EQ(recorder_of(path_), Recorder::there);
     for (const std::size_t frames : {1000u, 3000u}) {
-      progress_->wanted = frames;
-      wait_until([&] { return progress_->flushed == frames; }, pid);
+      int status = 0;
+      ::waitpid(pid, &status, WUNTRACED);
+      ASSERT_TRUE(WIFSTOPPED(status));
       const Recording read = read_recording(path_);
       EXPECT_FALSE(read.closed);
       EXPECT_EQ(read.size(), frames);
       expect_prefix(read, elements);
+      ::kill(pid, frames == 1000 ? SIGCONT : SIGKILL);
     }
-    ending(pid, SIGKILL);
+    ::waitpid(pid, nullptr, 0);
     EXPECT_EQ(recorder_of(path_), Recorder::gone);
     std::filesystem::remove(path_);
   }
 }
 
 TEST_F(FrameRecorderProcess, KilledAtAnyMomentHoldsAllButTheLastSecond) {
-  std::mt19937_64 random(20110509);
-  const int runs = trials(20);
-  int appeared = 0;
-  for (int run = 0; run < runs; ++run) {
-    SCOPED_TRACE(run);
-    // As fast as the machine can: most of the time goes into saving, where a kill hurts most.
-    const pid_t pid = fork_recorder([&] {
-      FrameRecorder recorder(path_, sensor_of(elements));
-      for (;;) {
-        add_next(recorder);
+  expect_whole(trials(20), SIGALRM, [&] {
+    // As fast as the machine can: most of the time goes into saving, where a kill hurts most. After
+    // a number of frames, not a time, so that a slow machine is as far; then some way into saving.
+    const std::size_t frames = random_() % 5000;
+    const auto into_saving_us = static_cast<useconds_t>(1 + random_() % 2000);
+    FrameRecorder recorder(path_, sensor_of(elements));
+    for (;;) {
+      if (added_ == frames) {
+        ::ualarm(into_saving_us, 0);
       }
-    });
-    // A number of frames, not a time, so that a slow machine is as far; then some way into saving.
-    const std::size_t frames = random() % 5000;
-    wait_until([&] { return progress_->added >= frames; }, pid);
-    std::this_thread::sleep_for(std::chrono::microseconds(random() % 2000));
-    ending(pid, SIGKILL);
-    appeared += removed_whole() ? 1 : 0;
-  }
-  EXPECT_GE(appeared, runs * 3 / 4);  // the first rows are saved after 250 frames
+      add_next(recorder);
+    }
+  });
 }
 
 TEST_F(FrameRecorderProcess, FullDiskIsOneErrorAndLeavesWhatWasSaved) {
-  std::signal(SIGXFSZ, SIG_IGN);  // errors of writing, not signals
-  std::mt19937_64 random(7);
-  const int runs = trials(10);
-  int appeared = 0;
-  for (int run = 0; run < runs; ++run) {
-    SCOPED_TRACE(run);
-    const rlim_t bytes = 1000 + random() % 1500000;
-    const pid_t pid = fork_recorder([&] {
-      const rlimit limit{.rlim_cur = bytes, .rlim_max = bytes};
-      ::setrlimit(RLIMIT_FSIZE, &limit);
-      const std::string said = error_of(Fault::system, [&] {
-        FrameRecorder recorder(path_, sensor_of(elements));
-        while (progress_->added < 20000) {
-          add_next(recorder);
-        }
-      });
-      expect_named(said, {"stream.h5", "File too large"});
-      std::exit(HasFailure() ? 1 : 0);  // as a program ends: HDF5 crashes then, if it is not closed
+  expect_whole(trials(10), 0, [&] {
+    std::signal(SIGXFSZ, SIG_IGN);  // errors of writing, not signals
+    limit_process(RLIMIT_FSIZE, 1000 + random_() % 1500000);
+    const std::string said = error_of(Fault::system, [&] {
+      FrameRecorder recorder(path_, sensor_of(elements));
+      while (added_ < 20000) {
+        add_next(recorder);
+      }
     });
-    EXPECT_EQ(ending(pid), 0);
-    appeared += removed_whole() ? 1 : 0;
-  }
-  std::signal(SIGXFSZ, SIG_DFL);
-  EXPECT_GE(appeared, runs / 2);
+    expect_named(said, {"stream.h5", "File too large"});
+    std::exit(HasFailure() ? 1 : 0);  // as a program ends: HDF5 crashes then, if it is not closed
+  });
 }
 
 }  // namespace palpate::frame_recorder_test

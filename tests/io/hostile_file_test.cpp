@@ -1,10 +1,7 @@
 // Files that mean harm, or that only look so.
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <functional>
 
@@ -12,8 +9,9 @@
 #include "io/file_summary.hpp"
 #include "io/recording_survey.hpp"
 #include "palpate/files.hpp"
+#include "support/child_process.hpp"
 #include "support/memory_limit.hpp"
-#include "support/sanitized.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::hostile_file_test {
 
@@ -119,12 +117,10 @@ TEST_F(OutsideFile, FiltersAreNotLoaded) {
       return bytes;
     };
     ASSERT_GE(H5Zregister(&filter), 0);
-    const Hdf5Handle storage = storage_in({});
-    H5Pset_chunk(storage.get(), 2, shape_.data());
+    const Hdf5Handle storage = storage_in(shape_);
     H5Pset_filter(storage.get(), filter.id, H5Z_FLAG_MANDATORY, 0, nullptr);
-    const std::vector<float> values(6, 1.0F);
-    put_values(new_dataset(file, "pressure", H5T_NATIVE_FLOAT, space_of(shape_), storage.get()),
-               H5T_NATIVE_FLOAT, values.data());
+    H5Pset_alloc_time(storage.get(), H5D_ALLOC_TIME_EARLY);
+    new_dataset(file, "pressure", H5T_NATIVE_FLOAT, space_of(shape_), storage.get());
   });
   H5PLremove(0);
 }
@@ -143,115 +139,65 @@ TEST_F(OutsideFile, ExternalLinksAndPluginsStayAllowedElsewhere) {
 
 constexpr std::uint64_t mib = 1 << 20;
 
-// Writes a dataset of floats whose chunks all hold these values: made by copying the stored bytes
-// of the first chunk.
-void save_equal_chunks(const std::filesystem::path& path, const char* name, const Extents& extents,
-                       const Extents& chunk, const std::vector<float>& values) {
+// Adds a dataset of this float throughout, which is stored in far less than its size.
+void add_constant(const std::filesystem::path& path, const char* name, const Extents& extents,
+                  const Extents& chunk, float value) {
   edit(path, [&](hid_t file) {
-    const Hdf5Handle space = space_of(extents);
-    const Hdf5Handle dataset =
-        new_dataset(file, name, H5T_NATIVE_FLOAT, space, storage_in(chunk).get());
-    const hsize_t origin[] = {0, 0};
-    H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, origin, nullptr, chunk.data(), nullptr);
-    ASSERT_GE(H5Dwrite(dataset.get(), H5T_NATIVE_FLOAT, space_of(chunk).get(), space.get(),
-                       H5P_DEFAULT, values.data()),
-              0);
-    ASSERT_GE(H5Dflush(dataset.get()), 0);
-    hsize_t size = 0;
-    ASSERT_GE(H5Dget_chunk_storage_size(dataset.get(), origin, &size), 0);
-    std::string stored(size, '\0');
-    std::uint32_t filters = 0;
-    ASSERT_GE(H5Dread_chunk(dataset.get(), H5P_DEFAULT, origin, &filters, stored.data()), 0);
-    for (hsize_t j = 0; j < extents[0]; j += chunk[0]) {
-      for (hsize_t i = 0; i < extents[1]; i += chunk[1]) {
-        const hsize_t place[] = {j, i};
-        ASSERT_GE(H5Dwrite_chunk(dataset.get(), H5P_DEFAULT, 0, place, size, stored.data()), 0);
-      }
-    }
+    const Hdf5Handle storage = storage_in(chunk);
+    H5Pset_fill_value(storage.get(), H5T_NATIVE_FLOAT, &value);
+    H5Pset_alloc_time(storage.get(), H5D_ALLOC_TIME_EARLY);  // writes every chunk
+    new_dataset(file, name, H5T_NATIVE_FLOAT, space_of(extents), storage.get());
   });
-}
-
-// A stream of `chunks` times 4,096 frames of 40 elements: 640 KiB of pressures each.
-void save_frames(const std::filesystem::path& path, hsize_t chunks) {
-  constexpr hsize_t rows = 4096;
-  constexpr hsize_t elements = 40;
-  std::vector<double> places;
-  for (hsize_t k = 0; k < elements; ++k) {
-    places.insert(places.end(), {2.0 * static_cast<double>(k), 0.0});
-  }
-  recording_parts()
-      .attribute("rows", "frames")
-      .without("pressure")
-      .without("sensor_pose")
-      .dataset("elements", {elements, 2}, places)
-      .save(path);
-  std::vector<float> pressures(rows * elements, 0.0F);
-  pressures.back() = 5.0F;
-  save_equal_chunks(path, "pressure", {rows * chunks, elements}, {rows, elements}, pressures);
-  save_equal_chunks(path, "sensor_pose", {rows * chunks, 3}, {rows, 3},
-                    std::vector<float>(rows * 3, 1.5F));
 }
 
 // Files that hold far more than their size on the disk says.
 class LargeFile : public OneFile {
  protected:
-  // Private writable memory of this process, as RLIMIT_DATA counts it.
-  static std::uint64_t data_bytes() {
+  // Whether the work returns true in a process that may hold so much memory beyond what this one
+  // holds already.
+  static bool done_with_memory(std::uint64_t bytes, const std::function<bool()>& work) {
     std::uint64_t pages[6] = {};  // size, resident, shared, text, library, data
     std::ifstream statm("/proc/self/statm");
     for (std::uint64_t& field : pages) {
       statm >> field;
     }
-    return pages[5] * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-  }
-
-  // Whether the work, in a process of its own that may hold so much memory beyond what it holds
-  // already, returns true.
-  static bool done_with_memory(std::uint64_t bytes, const std::function<bool()>& work) {
-    const pid_t pid = ::fork();
-    if (pid == 0) {
-      const rlimit limit{.rlim_cur = data_bytes() + bytes, .rlim_max = RLIM_INFINITY};
-      ::setrlimit(RLIMIT_DATA, &limit);
-      try {
-        ::_exit(work() ? 0 : 1);
-      } catch (const std::exception&) {
-        ::_exit(2);
-      }
-    }
-    int status = -1;
-    ::waitpid(pid, &status, 0);
-    return status == 0;
+    // Private writable memory, as RLIMIT_DATA counts it.
+    const std::uint64_t held = pages[5] * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+    return status_of([&] {
+             limit_process(RLIMIT_DATA, held + bytes);
+             ::_exit(work() ? 0 : 1);
+           }) == 0;
   }
 };
 
-// 67 MB of cells, stored as 18 KB for each of 16 chunks. What compresses by a factor of 1000 takes
-// its time to read; a limit is for what is read.
-TEST_F(LargeFile, MapIsSummarizedInPiecesAndReadWhole) {
+// 67 MB of cells and 42 MB of pressures.
+TEST_F(LargeFile, IsSummarizedInPieces) {
+  if (sanitized || !limits_memory()) {
+    GTEST_SKIP() << "memory of processes is not limited here";
+  }
   constexpr hsize_t edge = 1024;
   map_parts().without("log_odds").save(path_);
-  save_equal_chunks(path_, "log_odds", {4 * edge, 4 * edge}, {edge, edge},
-                    std::vector<float>(edge * edge, 0.0F));
-  EXPECT_EQ(read_map(path_).log_odds.size(), 4096u * 4096u);
-  if (sanitized) {
-    GTEST_SKIP() << "the sanitizer holds memory of its own";
-  }
+  add_constant(path_, "log_odds", {4 * edge, 4 * edge}, {edge, edge}, 0.0F);
   EXPECT_TRUE(done_with_memory(40 * mib, [&] {
     const MapSummary summary = summarize_map(path_);
     return summary.head.nx == 4096 && summary.occupied == 0 && summary.log_odds.most == 0.0;
   }));
-}
-
-// 42 MB of pressures.
-TEST_F(LargeFile, RecordingIsSurveyedInPieces) {
-  if (sanitized || !limits_memory()) {
-    GTEST_SKIP() << "memory of processes is not limited here";
-  }
-  constexpr hsize_t chunks = 64;
-  save_frames(path_, chunks);
+  // What compresses by a factor of 1000 takes its time to read; a limit is for what is read.
+  EXPECT_EQ(read_map(path_).log_odds.size(), 4096u * 4096u);
+  constexpr hsize_t rows = 64 * 4096;
+  constexpr hsize_t elements = 40;
+  recording_parts()
+      .attribute("rows", "frames")
+      .without("pressure")
+      .without("sensor_pose")
+      .dataset("elements", {elements, 2})
+      .save(path_);
+  add_constant(path_, "pressure", {rows, elements}, {4096, elements}, 5.0F);
+  add_constant(path_, "sensor_pose", {rows, 3}, {4096, 3}, 1.5F);
   EXPECT_TRUE(done_with_memory(20 * mib, [&] {
     const RecordingSurvey survey = survey_recording(path_);
-    return survey.head.rows == 4096 * chunks && survey.pressure.in_contact == chunks &&
-           survey.with_pose == 4096 * chunks && findings_of(survey).size() == 0;
+    return survey.head.rows == rows && survey.pressure.in_contact == rows &&
+           survey.with_pose == rows;
   }));
   EXPECT_FALSE(done_with_memory(20 * mib, [&] { return read_recording(path_).size() > 0; }))
       << "the limit holds";

@@ -75,7 +75,6 @@ TEST_F(MapFile, NamesAttributesItCannotTake) {
   expect_named(spoilt("origin_mm", std::vector<double>{0, nan}), {"'origin_mm'", "nan"});
   expect_named(spoilt("origin_mm", std::vector<double>{0, 0, 0}), {"'origin_mm'", "3", "2"});
   expect_named(spoilt("label", "(none)"), {"'label'", "(none)"});
-  expect_named(spoilt("version", 2), {"'version'", "newer"});
   expect_named(spoilt("format", "palpate.recording"), {"a recording", "map"});
   for (const char* name :
        {"format", "version", "label", "cell_mm", "origin_mm", "prior", "symmetry"}) {

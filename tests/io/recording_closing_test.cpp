@@ -1,16 +1,13 @@
 // A recording that was cut off is closed for programs other than Palpate.
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <functional>
 
 #include "file_parts.hpp"
 #include "io/recording_state.hpp"
 #include "numbered_frames.hpp"
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"
+#include "support/child_process.hpp"
 #include "support/limits.hpp"
 
 namespace palpate::recording_closing_test {
@@ -21,21 +18,9 @@ class RecordingClosing : public OneFile {
  protected:
   RecordingClosing() : OneFile("frames.h5") {}
 
-  // How a process of its own ends that does this.
-  static int status_of(const std::function<void()>& work) {
-    const pid_t pid = ::fork();
-    if (pid == 0) {
-      work();
-      ::_exit(0);  // as a kill
-    }
-    int status = -1;
-    ::waitpid(pid, &status, 0);
-    return status;
-  }
-
   // A recording of so many frames whose recorder ended without closing it.
   void cut_off(std::size_t frames) const {
-    const auto record = [&] {
+    const int status = status_of([&] {
       FrameRecorder recorder(path_, sensor_of(elements));
       for (std::size_t i = 0; i < frames; ++i) {
         recorder.add(frame_of(i, elements));
@@ -45,8 +30,8 @@ class RecordingClosing : public OneFile {
       }
       recorder.flush();
       ::_exit(0);  // before the recorder closes it
-    };
-    ASSERT_EQ(status_of(record), 0);
+    });
+    ASSERT_EQ(status, 0);
   }
 
   // Marks the file as open, as a recorder that was killed leaves it.
@@ -119,22 +104,21 @@ TEST_F(RecordingClosing, ABaselineThatIsHalfWrittenWasNotTaken) {
   FrameRecorder recorder(path_, with_baseline);
   recorder.add(frame_of(0, elements));
   recorder.close();
-  const auto unwrite = [&](std::size_t first, std::size_t end) {
+  const auto unwrite = [&](std::ptrdiff_t first, std::ptrdiff_t count) {
     std::vector<double> baseline(elements, 1.0);
-    std::fill(baseline.begin() + static_cast<std::ptrdiff_t>(first),
-              baseline.begin() + static_cast<std::ptrdiff_t>(end), nan);
+    std::fill_n(baseline.begin() + first, count, nan);
     edit(path_, [&](hid_t file) {
       put_values(dataset_of(file, "baseline"), H5T_NATIVE_DOUBLE, baseline.data());
     });
   };
-  unwrite(20, elements);
+  unwrite(20, 16);
   EXPECT_TRUE(read_recording(path_).baseline.empty());
   leave_open();
   EXPECT_TRUE(read_recording(path_).baseline.empty());
   EXPECT_TRUE(close_recording(path_));
   EXPECT_TRUE(read_recording(path_).baseline.empty());
   expect_frames(1);
-  unwrite(3, 4);
+  unwrite(3, 1);
   EXPECT_EQ(read_recording(path_).baseline.size(), elements) << "element 3 is dead";
 }
 
@@ -152,12 +136,7 @@ TEST_F(RecordingClosing, WhileItIsRecordedIsRefusedAndCostsNothing) {
   EXPECT_FALSE(read_recording(path_).closed);
   const auto close = [&] { close_recording(path_); };
   expect_named(refusal(close), {"recording", "wait"});
-  EXPECT_EQ(status_of([&] {
-              refusal(close);
-              ::_exit(HasFailure() ? 1 : 0);
-            }),
-            0)
-      << "another process is refused as well";
+  EXPECT_EQ(status_of([&] { refusal(close); }), 0) << "another process is refused as well";
   record_to(1000);
   recorder.close();
   EXPECT_TRUE(read_recording(path_).closed);
@@ -187,7 +166,6 @@ TEST_F(RecordingClosing, NeedsTheRightToWrite) {
               constexpr uid_t nobody = 65534;
               EXPECT_EQ(::setuid(::getuid() == 0 ? nobody : ::getuid()), 0);  // root may all
               expect_named(refusal([&] { close_recording(path_); }), {"permissions"});
-              ::_exit(HasFailure() ? 1 : 0);
             }),
             0);
   expect_frames(300);

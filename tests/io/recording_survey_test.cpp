@@ -146,31 +146,34 @@ TEST_F(RecordingSurveyed, SimulatedTouchesAreSound) {
 
 using Change = std::function<void(Recording&)>;
 
+template <typename Value, typename Function>
+Change each(std::vector<Value> Recording::*list, Function change) {
+  return [=](Recording& r) { std::ranges::transform(r.*list, (r.*list).begin(), change); };
+}
+
 template <typename Value>
 Change scale(std::vector<Value> Recording::*list, double factor) {
+  return each(list, [=](const Value& value) { return factor * value; });
+}
+
+Change both(const Change& first, const Change& second) {
   return [=](Recording& r) {
-    for (Value& value : r.*list) {
-      value *= factor;
-    }
+    first(r);
+    second(r);
   };
 }
 
-Change each_pose(Pose (*change)(const Pose&)) {
-  return [=](Recording& r) {
-    std::ranges::transform(r.T_robot_sensor, r.T_robot_sensor.begin(), change);
-  };
+Change raw(const std::function<double(double)>& change) {
+  return both(each(&Recording::pressure, change), [](Recording& r) { r.pressure_unit = "raw"; });
 }
 
-Change each_reading(const std::function<double(double)>& change, const char* unit) {
-  return [=](Recording& r) {
-    std::ranges::transform(r.pressure, r.pressure.begin(), change);
-    r.pressure_unit = unit;
-  };
+auto constant(double value) {
+  return [=](double) { return value; };
 }
 
 /// As of an 8-bit sensor, cut at its largest value.
 Change quantize(double gain) {
-  return each_reading([=](double kpa) { return std::min(255.0, std::round(gain * kpa)); }, "raw");
+  return raw([=](double kpa) { return std::min(255.0, std::round(gain * kpa)); });
 }
 
 Change element(std::size_t e, const std::function<double(double)>& change) {
@@ -179,10 +182,6 @@ Change element(std::size_t e, const std::function<double(double)>& change) {
       reading(r, i, e) = change(reading(r, i, e));
     }
   };
-}
-
-Change element(std::size_t e, double value) {
-  return element(e, [=](double) { return value; });
 }
 
 Change forget_poses(std::ptrdiff_t count) {
@@ -195,13 +194,6 @@ Change write_again(std::size_t from, std::size_t to) {
     for (std::size_t e = 0; e < r.elements(); ++e) {
       reading(r, to, e) = reading(r, from, e);
     }
-  };
-}
-
-Change both(const Change& first, const Change& second) {
-  return [=](Recording& r) {
-    first(r);
-    second(r);
   };
 }
 
@@ -229,7 +221,7 @@ Pose in_degrees(const Pose& T) {
 Pose counted_on(const Pose& T) { return {T.translation_mm, T.theta_rad + 1.5 * std::numbers::pi}; }
 
 const Change twice_again = both(write_again(20, 30), write_again(20, 31));
-const Change constant_elements = both(element(4, 7.25), element(9, 7.25));
+const Change constant_elements = both(element(4, constant(7.25)), element(9, constant(7.25)));
 
 /// What is suspected of a recording after a change: one thing that says both, or nothing.
 struct Rule {
@@ -250,19 +242,20 @@ const Rule rules[] = {
     {"ElementsAtOnePlace", training,
      [](Recording& r) { r.elements_mm[7] = r.elements_mm[30] + glm::dvec2(0.005, 0.0); },
      "Elements 7 and 30", "0.005 mm apart"},
-    {"PosesInMetres", training, each_pose(in_metres), "0.0204 x 0.0204 mm", "metres"},
-    {"PosesOfOnePlace", training, both(each_pose(in_metres), tremble)},
-    {"AnglesInDegrees", training, each_pose(in_degrees), "330", "degrees"},
-    {"AnglesBeyondATurn", training, each_pose(counted_on)},
+    {"PosesInMetres", training, each(&Recording::T_robot_sensor, in_metres), "0.0204 x 0.0204 mm",
+     "metres"},
+    {"PosesOfOnePlace", training, both(each(&Recording::T_robot_sensor, in_metres), tremble)},
+    {"AnglesInDegrees", training, each(&Recording::T_robot_sensor, in_degrees), "330", "degrees"},
+    {"AnglesBeyondATurn", training, each(&Recording::T_robot_sensor, counted_on)},
     {"ConstantElements", training, constant_elements, "Elements 4, 9 read", "7.25 kPa"},
-    {"ElementOfZero", training, element(4, 0.0), "Element 4 reads", "0 kPa"},
-    {"ConstantReadings", training, each_reading([](double) { return 3.0; }, "kPa"),
+    {"ElementOfZero", training, element(4, constant(0.0)), "Element 4 reads", "0 kPa"},
+    {"ConstantReadings", training, each(&Recording::pressure, constant(3.0)),
      "No element's reading ever changes"},
     {"ReadingsOf8Bits", training, quantize(8.0)},
     {"SaturatedReadings", training, quantize(16.0), "exactly the largest, 255 raw", "saturates"},
-    {"Switches", training, each_reading(as_switch, "raw")},
+    {"Switches", training, raw(as_switch)},
     {"NothingInContact", training, scale(&Recording::pressure, 1e-3), "ever in contact", "2 kPa"},
-    {"SmallRawReadings", training, each_reading([](double kpa) { return 1e-3 * kpa; }, "raw")},
+    {"SmallRawReadings", training, raw([](double kpa) { return 1e-3 * kpa; })},
     {"Pascals", training, scale(&Recording::pressure, 1e3), "10000 kPa", "pascals"},
     {"TouchesWrittenAgain", training, twice_again, "2 of 192 touches equal an earlier one"},
     {"TouchesThatDifferInADigit", training, both(twice_again, touch_again_nearby)},
@@ -273,7 +266,7 @@ const Rule rules[] = {
     {"TimeGoesBackwards", stream, [](Recording& r) { std::swap(r.time_s[50], r.time_s[51]); },
      "backwards at 1 row, first at row 51"},
     {"TimesInMilliseconds", stream, scale(&Recording::time_s, 1e3), "0.5 s apart", "millisec"},
-    {"ElementReadsNothing", stream, element(11, nan), "Element 11 has no known reading"},
+    {"ElementReadsNothing", stream, element(11, constant(nan)), "Element 11 has no known reading"},
     {"ElementOfAnOffset", stream, element(20, with_offset)},
     {"ElementAlwaysTouched", stream,
      both(element(20, with_offset), [](Recording& r) { r.baseline.assign(36, 0.0); }),

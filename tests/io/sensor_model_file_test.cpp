@@ -1,50 +1,15 @@
 #include <gtest/gtest.h>
 
+#include <numeric>
+
+#include <fmt/ranges.h>
+
 #include "file_parts.hpp"
 #include "palpate/learned_sensor.hpp"
 
 namespace palpate::sensor_model_file_test {
 
-LearnedSensor full_sensor() {
-  LearnedSensor sensor{
-      .pressure_unit = "raw",
-      .noise = 0.25,
-      .classifier = {.threshold = 15.0, .ratio = 0.15},
-      .gamma = 0.2,
-      .prior = 0.1,
-      .spread_mm = 1.14,
-      .touch_sd = {.mm = 0.5, .rad = 0.0625},
-      .table = LearnedTable{},
-      .temperature = 31.5,
-      .temperature_growth = 2.25,
-      .bins = BinSteps{.x_mm = 0.5, .y_mm = 0.25, .theta_rad = 0.125},
-      .features = LearnedFeatures{},
-      .fit_scale = FitScale{.mean = -4.5,
-                            .sd = 12.25,
-                            .shared_sd = 0.5,
-                            .single_touch = SingleFitScale{1.5, 0.75},
-                            .stranger_sd = 3.25,
-                            .stranger_single_touch = SingleFitScale{-4.25, 2.75},
-                            .array = FitArray{.elements = 36.0, .spacing_mm = 1.875}},
-      .pose_scale = PoseScale{.factor = 1.25, .map_sd_mm = 0.375}};
-  sensor.table->layer = {.of = MapLayer::mean_level,
-                         .near_mm = 3.5,
-                         .far_mm = 11.0,
-                         .unit_level = 2.0,
-                         .full_level = 250.0};
-  sensor.table->level_edges = {35.0};
-  for (std::size_t i = 0; i < 3 * ReadingLayer::nodes; ++i) {
-    sensor.table->shared.push_back(-0.125 * static_cast<double>(i));
-  }
-  sensor.table->objects["pen: \"blue\""].assign(3 * ReadingLayer::nodes, -1.5);
-  sensor.features->weight = 0.25;
-  sensor.features->any = {.mean = {1.0, 2.0, 3.0}, .sd = {0.5, 0.25, 2.0}};
-  sensor.features->objects["pen"] = {
-      .mean = {4.0, 5.0, 6.0}, .sd = {1.0, 1.0, 0.75}, .correlation = {0.5, -0.25, 0.125}};
-  return sensor;
-}
-
-// Its file, as far as the numbers of the table.
+// Every key, as far as the numbers of the table.
 const std::string full_text =
     R"(format: palpate.sensor_model
 version: 1
@@ -78,6 +43,25 @@ table:
   all:
 )";
 
+// The table's numbers are logs of probabilities: these count up, to below 0.
+constexpr int first_number = -150;
+
+// A line for each of the table's three levels, with a number for every node.
+std::string levels_of(const std::string& indent) {
+  std::string lines;
+  std::vector<int> numbers(ReadingLayer::nodes);
+  for (const int level : {0, 1, 2}) {
+    std::iota(numbers.begin(), numbers.end(), first_number + level * ReadingLayer::nodes);
+    lines += fmt::format("{}- [{}]\n", indent, fmt::join(numbers, ", "));
+  }
+  return lines;
+}
+
+std::string full_file() {
+  return full_text + levels_of("    ") + "  objects:\n    \"pen: \\\"blue\\\"\":\n" +
+         levels_of("      ");
+}
+
 class SensorModelFile : public OneFile {
  protected:
   SensorModelFile() : OneFile("sensor.yaml") {}
@@ -96,13 +80,25 @@ class SensorModelFile : public OneFile {
 };
 
 TEST_F(SensorModelFile, IsWrittenAndReadInEveryKey) {
-  const LearnedSensor sensor = full_sensor();
-  const std::string text = written(sensor);
-  EXPECT_EQ(text.substr(0, full_text.size()), full_text);
-  const LearnedSensor read = read_sensor_model(path_);
-  EXPECT_EQ(read.table->shared, sensor.table->shared);
-  EXPECT_EQ(read.table->objects, sensor.table->objects);
-  EXPECT_EQ(written(read), text);
+  const LearnedSensor s = read(full_file());
+  EXPECT_EQ(written(s), full_file());
+  EXPECT_EQ(s.pressure_unit, "raw");
+  const std::vector<double> numbers{
+      s.noise,      s.classifier.threshold, s.classifier.ratio, s.gamma,       s.prior,
+      s.spread_mm,  s.touch_sd.mm,          s.touch_sd.rad,     s.temperature, s.bins->x_mm,
+      s.bins->y_mm, s.bins->theta_rad};
+  EXPECT_EQ(numbers, (std::vector<double>{0.25, 15, 0.15, 0.2, 0.1, 1.14, 0.5, 0.0625, 31.5, 0.5,
+                                          0.25, 0.125}));
+  const FitScale& fit = s.fit_scale.value();
+  const std::vector<double> of_fit{fit.mean, fit.sd, fit.single_touch->mean,
+                                   fit.stranger_single_touch->sd, fit.array->spacing_mm};
+  EXPECT_EQ(of_fit, (std::vector<double>{-4.5, 12.25, 1.5, 2.75, 1.875}));
+  EXPECT_EQ(s.features->objects.at("pen").correlation[1], -0.25);
+  std::vector<double> levels(3 * ReadingLayer::nodes);
+  std::iota(levels.begin(), levels.end(), first_number);
+  EXPECT_EQ(s.table->layer.far_mm, 11.0);
+  EXPECT_EQ(s.table->shared, levels);
+  EXPECT_EQ(s.table->objects.at("pen: \"blue\""), levels);
 }
 
 TEST_F(SensorModelFile, MayLeaveKeysOut) {
@@ -111,7 +107,7 @@ TEST_F(SensorModelFile, MayLeaveKeysOut) {
   EXPECT_EQ(bare.temperature, 1.0);
   EXPECT_EQ(bare.temperature_growth, 0.0);
   EXPECT_FALSE(bare.table || bare.features || bare.fit_scale || bare.bins || bare.pose_scale);
-  LearnedSensor sensor = full_sensor();  // which tells nothing of strangers and of single touches
+  LearnedSensor sensor = bare;  // which tells nothing of strangers and of single touches
   sensor.fit_scale = FitScale{.mean = 0.5, .sd = 12.25};
   EXPECT_NE(written(sensor).find("\nfit_scale: {mean: 0.5, sd: 12.25}\n"), std::string::npos);
   const FitScale scale = read_sensor_model(path_).fit_scale.value();
@@ -121,7 +117,7 @@ TEST_F(SensorModelFile, MayLeaveKeysOut) {
 }
 
 TEST_F(SensorModelFile, NamesTheKeyThatIsWrong) {
-  const std::string text = written(full_sensor());
+  const std::string text = full_file();
   struct Row {
     std::string right;
     const char* wrong;

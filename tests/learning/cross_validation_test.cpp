@@ -38,14 +38,6 @@ CrossValidation tried(const std::vector<Press>& presses, const std::vector<std::
   return all;
 }
 
-/// Touches of an A and a U.
-LetterPresses two_letters(int of_a, int of_u, std::uint64_t seed = 16) {
-  LetterPresses letters;
-  letters.add("A", of_a, seed);
-  letters.add("U", of_u, seed + 1);
-  return letters;
-}
-
 /// Two folds on bins about this place.
 CalibrationSettings on_bins(int bins, int theta_bins, double half_mm = 12.0, double x_mm = 0.0) {
   return {.folds = 2,
@@ -86,7 +78,7 @@ TEST(CrossValidation, LeavesOutPressesWhoseObjectHasNoMapWithoutThem) {
 }
 
 TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) {
-  const LetterPresses letters = two_letters(24, 14);
+  const LetterPresses letters = two_letters(24, 14, 16);
   // A place that the presses do not have: only as unknowns do they come there.
   const CalibrationSettings options = on_bins(24, 48, 12.0, 100.0);
   const CrossValidation found = tried(letters.presses, {"A", "U"}, options);
@@ -106,8 +98,6 @@ TEST(CrossValidation, LooksForPressesAtKnownPosesAsForUnknownsAloneAndInGroups) 
   }
   EXPECT_GT(scores_of(groups, 1.0).accuracy(), 0.95) << "24 of 28 are of A";
   EXPECT_GT(scores_of(presses, 1.0).accuracy(), 0.85) << "24 of 38 are of A";
-  const CrossValidation again = tried(letters.presses, {"A", "U"}, options);
-  EXPECT_EQ(groups_in(again.unknowns).back().log_evidence, groups.back().log_evidence);
 }
 
 TEST(CrossValidation, TakesNoMoreMapsOfAnObjectThanItMay) {
@@ -125,7 +115,8 @@ TEST(CrossValidation, TakesNoMoreMapsOfAnObjectThanItMay) {
 }
 
 TEST(CrossValidation, SharesTheGroupsOfFewPressesBetweenTheHalves) {
-  const CrossValidation found = tried(two_letters(8, 8).presses, {"A", "U"}, on_bins(6, 8, 9.0));
+  const CrossValidation found =
+      tried(two_letters(8, 8, 16).presses, {"A", "U"}, on_bins(6, 8, 9.0));
   // One of each letter in each fold.
   for (const std::size_t one : {0U, 1U}) {
     const std::vector<HeldOut> half = of_half(found.unknowns, one);
@@ -196,23 +187,18 @@ TEST(CrossValidation, JudgesHowPressesFitBestAndHowStrangersFitTheBestOfTwoOther
 }
 
 TEST(ClearlyLess, IsByMoreThanTwoStandardErrors) {
-  // Differences one above and one below their mean in turn: a standard error of 1 / sqrt(n - 1).
-  const auto losses = [](double mean, int n) {
-    std::vector<double> of_each;
-    for (int i = 0; i < n; ++i) {
-      of_each.push_back(10.0 - mean + (i % 2 == 0 ? 1.0 : -1.0));
+  // A hundred differences, one above and one below their mean in turn: a standard error of 0.1005.
+  const auto clearly_less = [](double mean, double deviation) {
+    std::vector<double> losses;
+    for (int i = 0; i < 100; ++i) {
+      losses.push_back(10.0 - mean + (i % 2 == 0 ? deviation : -deviation));
     }
-    return of_each;
+    return difference_of(losses, std::vector(100, 10.0)).is_clear();
   };
-  const std::vector<double> same(100, 10.0);
-  const auto clearly_less = [](const std::vector<double>& a, const std::vector<double>& b) {
-    return difference_of(a, b).is_clear();
-  };
-  EXPECT_TRUE(clearly_less(losses(2.0, 100), same));
-  EXPECT_TRUE(clearly_less(losses(0.21, 100), same));
-  EXPECT_FALSE(clearly_less(losses(0.19, 100), same)) << "within two standard errors of 0.1005";
-  EXPECT_FALSE(clearly_less(losses(-2.0, 100), same));
-  EXPECT_FALSE(clearly_less(same, same));
+  EXPECT_TRUE(clearly_less(0.21, 1.0));
+  EXPECT_FALSE(clearly_less(0.19, 1.0));
+  EXPECT_FALSE(clearly_less(-2.0, 1.0));
+  EXPECT_FALSE(clearly_less(0.0, 0.0));
 }
 
 /// Presses whose label has this loss, and groups with these pose errors.
@@ -302,13 +288,12 @@ Fits fits_of(const std::vector<Drawn>& strangers) {
 
 TEST(WithStrangers, FindsTheSdByWhichFitsWereDrawn) {
   for (const double truth : {1.5, 3.0, 6.0}) {
-    const Fits fits = fits_of({{0, 300, 3, truth},
-                               {1, 300, 3, truth},
-                               {2, 300, 3, truth},
-                               {0, 100, 2, truth},
-                               {1, 100, 2, truth},
-                               {2, 100, 2, truth}});
-    EXPECT_NEAR(sd_of(fits).value(), truth, 0.1 * truth);
+    std::vector<Drawn> strangers;
+    for (const std::size_t label : {0U, 1U, 2U}) {
+      strangers.push_back({label, 300, 3, truth});
+      strangers.push_back({label, 100, 2, truth});
+    }
+    EXPECT_NEAR(sd_of(fits_of(strangers)).value(), truth, 0.1 * truth);
   }
 }
 

@@ -1,6 +1,5 @@
 #include "learning/sensor_calibration.hpp"
 
-#include <algorithm>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -120,15 +119,11 @@ TEST(SensorCalibration, LearnsTheSameGammaWhateverTheBins) {
 }
 
 TEST(SensorCalibration, OfFewTouchesAtKnownPosesSaysThatGroupsAreMissing) {
-  LetterPresses letters;
-  letters.add("A", 8, 38);
-  letters.add("U", 8, 39);
+  const LetterPresses letters = two_letters(8, 8, 38);
   const SensorCalibration found = calibrate_sensor(letters.presses, {}, {});
   EXPECT_FALSE(found.groups.has_value());
   EXPECT_EQ(found.sensor.temperature_growth, 0.0);
-  EXPECT_TRUE(std::ranges::any_of(found.warnings, [](const std::string& warning) {
-    return warning.find("give 15 or more of each object") != std::string::npos;
-  }));
+  EXPECT_TRUE(warns(found, "give 15 or more of each object"));
 }
 
 TEST(SensorCalibration, ComparesWithTheMapsGiven) {
@@ -144,7 +139,7 @@ TEST(SensorCalibration, ComparesWithTheMapsGiven) {
   EXPECT_EQ(found.objects, 2U);
   EXPECT_EQ(found.touches->after.records, 32U);
   ASSERT_EQ(found.warnings.size(), 1U);
-  EXPECT_NE(found.warnings[0].find("'U'"), std::string::npos);
+  EXPECT_TRUE(warns(found, "'U'"));
 }
 
 TEST(SensorCalibration, KeepsTheFirstTableUnlessAnotherIsBetterBeyondChance) {
@@ -158,21 +153,6 @@ TEST(SensorCalibration, KeepsTheFirstTableUnlessAnotherIsBetterBeyondChance) {
   EXPECT_GT(found.tried[0].log_loss, found.tried[1].log_loss) << "by chance";
   EXPECT_EQ(found.sensor.table->levels(), 4U);
   EXPECT_EQ(found.touches->after.log_loss, found.tried[0].log_loss);
-}
-
-TEST(SensorCalibration, TakesTheThresholdAndRatioGiven) {
-  const LetterPresses letters = three_letters(24);
-  const auto classifier = [&](std::optional<double> threshold, std::optional<double> ratio = {}) {
-    return calibrate_sensor(letters.presses, {},
-                            {.readings = {.threshold = threshold, .ratio = ratio},
-                             .tables = {{MapLayer::log_odds, 2}},
-                             .folds = 2,
-                             .bins = bins(5, 5, 6)})
-        .sensor.classifier;
-  };
-  EXPECT_EQ(classifier(1.0, 0.2).threshold, 1.0);
-  EXPECT_EQ(classifier(1.0, 0.2).ratio, 0.2);
-  EXPECT_NE(classifier(20.0).ratio, classifier(1.0).ratio) << "of touches that exceed it";
 }
 
 }  // namespace palpate::sensor_calibration_test

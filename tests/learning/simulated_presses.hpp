@@ -1,11 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "learning/sensor_calibration.hpp"
 #include "learning/table_learning.hpp"
 #include "palpate/simulation.hpp"
 #include "support/synthetic.hpp"
@@ -74,6 +76,13 @@ inline double normal(Uniform& random) {
   return std::sqrt(-2.0 * std::log(random(1e-12, 1.0))) * std::cos(two_pi * random(0.0, 1.0));
 }
 
+/// Whether a calibration warns of this.
+inline bool warns(const SensorCalibration& found, const std::string& part) {
+  return std::ranges::any_of(found.warnings, [&](const std::string& warning) {
+    return warning.find(part) != std::string::npos;
+  });
+}
+
 /// Touches of simulated letters by the DigiTacts array.
 struct LetterPresses {
   std::vector<Recording> recordings;  ///< one of each letter
@@ -100,5 +109,13 @@ struct LetterPresses {
     }
   }
 };
+
+/// Touches of an A and a U.
+inline LetterPresses two_letters(int of_a, int of_u, std::uint64_t seed) {
+  LetterPresses letters;
+  letters.add("A", of_a, seed);
+  letters.add("U", of_u, seed + 1);
+  return letters;
+}
 
 }  // namespace palpate

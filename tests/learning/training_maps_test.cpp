@@ -172,7 +172,7 @@ std::size_t cell_at(const OccupancyGrid& map, double x_mm, double y_mm) {
   return static_cast<std::size_t>(j) * map.nx + i;
 }
 
-TEST(ObservedMap, HasTheEvidenceOfTheMethod) {
+TEST(ObservedMap, HasTheEvidenceOfTheMethodInTheCellsOfMapBuilder) {
   const Recording recording = random_recording(5, 40, 7);
   const std::vector<Touch> touches = all_touches(recording);
   const MapOptions options{.cell_mm = 0.75, .sensor = {.spread_mm = 0.8, .prior = 0.1}};
@@ -181,14 +181,9 @@ TEST(ObservedMap, HasTheEvidenceOfTheMethod) {
   EXPECT_EQ(map.label, "A");
   EXPECT_EQ(map.prior, 0.1);
   EXPECT_EQ(map.spread_mm, 0.8);
-}
-
-TEST(ObservedMap, HasTheCellsOfMapBuilder) {
-  const Recording recording = random_recording(3, 20, 8);
-  MapBuilder builder(shared_device(), {});
-  builder.add(all_touches(recording));
+  MapBuilder builder(shared_device(), options);
+  builder.add(touches);
   const OccupancyGrid expected = builder.build("A");
-  const OccupancyGrid map = observed_map(all_touches(recording), {}, "A");
   EXPECT_EQ(map.origin_mm, expected.origin_mm);
   EXPECT_EQ(map.nx, expected.nx);
   EXPECT_EQ(map.ny, expected.ny);

@@ -159,16 +159,13 @@ FitTable sample_table() {
                   {0.0, 0.0, 0.0, 1.0}}};
 }
 
-TEST(NextMap, IsTheOneThatMostPressesFit) {
+TEST(NextMap, IsTheOneThatMostPressesFitUntilAllDo) {
   std::vector<double> best(6, 0.0);
   EXPECT_EQ(next_map(sample_table(), best, 0.5), 1u);
   best = {0.9, 1.0, 0.9, 0.1, 0.0, 0.0};
   EXPECT_EQ(next_map(sample_table(), best, 0.5), 2u);
   best = {0.9, 1.0, 0.9, 1.0, 0.7, 0.0};
   EXPECT_EQ(next_map(sample_table(), best, 0.5), 3u);
-}
-
-TEST(NextMap, NoneWhereAllPressesFit) {
   EXPECT_FALSE(next_map(sample_table(), std::vector<double>(6, 0.5), 0.5));
 }
 

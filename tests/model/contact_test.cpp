@@ -1,14 +1,12 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "model/contact_readings.hpp"
 #include "model/map_likelihood.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/contact.hpp"
 #include "palpate/contact_model.hpp"
 #include "palpate/touch.hpp"
@@ -59,21 +57,6 @@ TEST(ContactClassifier, DeadElementsAndNonNumbersAreUnknownAndDoNotSetTheMaximum
   EXPECT_EQ(classify({5.0, nan, 1.0}), (Readings{in, unknown, no}));
 }
 
-TEST(ContactClassifier, AgreesWithTheReference) {
-  Uniform random(11);
-  for (int trial = 0; trial < 200; ++trial) {
-    // Whole multiples, of a subnormal number too, so that many pressures equal a bound.
-    const double unit = trial % 2 == 0 ? 0.5 : std::numeric_limits<double>::denorm_min();
-    std::vector<double> pressure(9);
-    std::vector<std::uint8_t> valid(9);
-    for (std::size_t i = 0; i < pressure.size(); ++i) {
-      pressure[i] = unit * std::floor(random(0.0, 13.0));
-      valid[i] = random(0.0, 1.0) < 0.9 ? 1 : 0;
-    }
-    classify(pressure, valid, {.threshold = 4.0 * unit, .ratio = 0.5});
-  }
-}
-
 TEST(ContactClassifier, RefusesBoundsThatDecideNothing) {
   const auto expect_refused = [](const ContactClassifier& classifier, const char* field) {
     expect_named(input_error([&] { classifier.validate(); }), {field});
@@ -101,22 +84,6 @@ TEST(FaultOfReadings, IsAPlaceBeyondWhatAMapMayReach) {
   }
 }
 
-TEST(KnownReadings, AreInTheRobotFrameWithoutTheUnknown) {
-  const std::vector<glm::dvec2> elements{{1.0, 0.0}, {2.0, 0.0}, {3.0, 0.0}};
-  const std::vector<double> pressure{10.0, 2.5, 0.0};
-  const Touch touch{.T_robot_sensor = {{100.0, 200.0}, std::numbers::pi / 2.0},
-                    .elements_mm = elements,
-                    .pressure = pressure};
-  const std::vector<ElementReading> known = known_readings(touch, {});
-  ASSERT_EQ(known.size(), 2U);
-  // A quarter turn puts the sensor's x axis along the robot's y; 1e-12 mm is float64 rounding.
-  EXPECT_EQ(known[0].reading, in);
-  EXPECT_NEAR(known[0].position_mm.x, 100.0, 1e-12);
-  EXPECT_NEAR(known[0].position_mm.y, 201.0, 1e-12);
-  EXPECT_EQ(known[1].reading, no);
-  EXPECT_NEAR(known[1].position_mm.y, 203.0, 1e-12);
-}
-
 /// The model's log-likelihood, which must be the reference's.
 double log_likelihood(const ContactModel& model, Reading reading, double log_odds,
                       std::size_t object = 0) {
@@ -129,25 +96,16 @@ double log_likelihood(const ContactModel& model, Reading reading, double log_odd
 TEST(ContactModel, IsEquation7) {
   for (const double gamma : {0.0, 1e-6, 0.1, 0.5, 0.99}) {
     for (const double prior : {0.02, 0.2, 0.7}) {
-      for (double l = -30.0; l <= 30.0; l += 0.7) {
-        for (const Reading reading : {in, no, unknown}) {
-          log_likelihood({.gamma = gamma, .prior = prior}, reading, l);
+      for (const Reading reading : {in, no, unknown}) {
+        const ContactModel model{.gamma = gamma, .prior = prior};
+        for (double l = -30.0; l <= 30.0; l += 0.7) {
+          log_likelihood(model, reading, l);
         }
+        log_likelihood(model, reading, -1000.0);
+        log_likelihood(model, reading, 1000.0);
       }
     }
   }
-}
-
-TEST(ContactModel, HasAFloorWithGammaAlone) {
-  const ContactModel without{.gamma = 0.0, .prior = 0.2};
-  EXPECT_EQ(without.log_likelihood(in, {-1000.0}), -1000.0);
-  EXPECT_EQ(without.log_likelihood(in, {1000.0}), 0.0);
-  EXPECT_EQ(without.log_likelihood(no, {1000.0}), -1000.0);
-  EXPECT_EQ(without.log_likelihood(no, {-1000.0}), 0.0);
-  const ContactModel with{.gamma = 0.1, .prior = 0.2};
-  EXPECT_NEAR(with.log_likelihood(in, {-1000.0}), std::log(0.02), 1e-15);
-  EXPECT_NEAR(with.log_likelihood(no, {1000.0}), std::log(0.02), 1e-15);
-  EXPECT_NEAR(with.log_likelihood(in, {1000.0}), std::log(0.92), 1e-15);
 }
 
 TEST(ContactModel, RefusesWhatIsOutOfRange) {
@@ -230,20 +188,15 @@ TEST(LikelihoodTable, RefusesOneThatIsNotSound) {
   expect_refused([](Table& t) { t.level_edges = {5.0, 3.0}; }, "level_edges[1] = 3");
   expect_refused([](Table& t) { t.level_edges = {5.0, 5.0}; }, "level_edges[1] = 5");
   expect_refused([](Table& t) { t.level_edges = {1, 2, 3, 4, 5, 6, 7}; }, "9 levels");
+  ContactModel most{.table = small_table()};
+  most.table->level_edges = {1, 2, 3, 4, 5, 6};
+  most.table->log_likelihood.assign(8 * 3, -1.0);
+  most.validate();
   expect_refused([](Table& t) { t.log_likelihood.clear(); }, "0 numbers");
   expect_refused([](Table& t) { t.log_likelihood.pop_back(); }, "17 numbers");
   for (const double nats : {nan, infinity, -infinity, -2e30}) {
     expect_refused([&](Table& t) { t.log_likelihood[13] = nats; }, "log_likelihood[1, 1, 1] = ");
   }
-}
-
-TEST(LikelihoodTable, HasUpToEightLevels) {
-  ContactModel model{.table = small_table()};
-  model.table->level_edges = {1, 2, 3, 4, 5, 6};
-  model.table->log_likelihood.assign(8 * 3, -1.0);
-  model.validate();
-  EXPECT_EQ(model.table->levels(), most_reading_levels);
-  EXPECT_EQ(model.log_likelihood(contact_level(6), {0.5}), -1.0);
 }
 
 TEST(MapLikelihood, OfAllReadingsIsTheContactModels) {

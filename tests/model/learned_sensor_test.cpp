@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "palpate/learned_sensor.hpp"
-#include "palpate/reading_layer.hpp"
 #include "support/errors.hpp"
 
 namespace palpate::learned_sensor_test {

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
-#include "palpate/sensor_model.hpp"
 #include "reference/reference.hpp"
 #include "support/errors.hpp"
 #include "support/limits.hpp"

@@ -56,13 +56,6 @@ TEST(Pose, IsOfAGroupThatActsInTurn) {
   }
 }
 
-TEST(Pose, TurnsCounterClockwiseThenMoves) {
-  const Pose T_a_b{{10.0, 20.0}, pi / 2.0};
-  const glm::dvec2 p_a = T_a_b * glm::dvec2(1.0, 2.0);
-  EXPECT_NEAR(p_a.x, 8.0, rounding);
-  EXPECT_NEAR(p_a.y, 21.0, rounding);
-}
-
 TEST(WrapAngle, LandsInTheHalfOpenPeriodAndKeepsTheAngle) {
   for (const double period : {2.0 * pi, pi, 2.0 * pi / 3.0}) {
     for (double angle = -25.0; angle < 25.0; angle += 0.37) {
@@ -123,23 +116,6 @@ TEST(ObjectPose, IsThePosesInverseAndItsCovarianceCarriedByTheJacobian) {
   }
 }
 
-// The object lies 2 m from the robot's origin and is known to 0.1 mm and 0.01 rad: seen from the
-// object, the robot's origin is uncertain by 20 mm; seen from the robot, the object is not.
-TEST(ObjectPose, AFarRobotOriginDoesNotBlurTheObject) {
-  const Pose T_robot_object{{1600.0, 1200.0}, 2.0};
-  const std::array<double, 9> known{0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 1e-4};
-  // The inverse undoes itself, the covariance included, whichever of the two frames is given.
-  const ObjectPose seen =
-      inverse(RefinedPose{.T_object_robot = T_robot_object, .covariance = known});
-  EXPECT_NEAR(std::hypot(seen.sd()[0], seen.sd()[1]), 20.0, 0.01);
-  const ObjectPose back =
-      inverse(RefinedPose{.T_object_robot = seen.T_robot_object, .covariance = seen.covariance});
-  for (std::size_t i = 0; i < 9; ++i) {
-    // Terms of (2000 mm)^2 times 1e-4 rad^2 cancel: some 1e-16 of 400 mm^2 remain.
-    EXPECT_NEAR(back.covariance[i], known[i], 1e-12) << "entry " << i;
-  }
-}
-
 /// An L of 2 mm cells: occupied at (10, 20), (12, 20), (14, 20) and (10, 22).
 OccupancyGrid letter_l() {
   return {.label = "L",
@@ -151,15 +127,6 @@ OccupancyGrid letter_l() {
 }
 
 constexpr double metric_rounding = 1e-10;  // of squares
-
-TEST(BodyOf, IsUniformOverTheOccupiedCells) {
-  const Body body = body_of(letter_l());
-  // x: 10, 12, 14, 10 and y: 20, 20, 20, 22.
-  EXPECT_DOUBLE_EQ(body.centroid_mm.x, 11.5);
-  EXPECT_DOUBLE_EQ(body.centroid_mm.y, 20.5);
-  // Mean squares: x (2.25 + 0.25 + 6.25 + 2.25) / 4, y (3 * 0.25 + 2.25) / 4.
-  EXPECT_DOUBLE_EQ(body.inertia_mm2, 2.75 + 0.75);
-}
 
 TEST(BodyOf, RefusesAMapWithoutOccupiedCells) {
   OccupancyGrid map = letter_l();
@@ -202,22 +169,6 @@ TEST(PoseError, OfATruthThatIsAbsurdlyFarAwayIsFinite) {
   EXPECT_NEAR(error_mm / 1e200, 1.0, 1e-12);
 }
 
-TEST(PoseLattice, OrderIsThetaThenYThenXWithXFastest) {
-  const PoseLattice lattice{.x_mm = {0.0, 3.0, 3}, .y_mm = {0.0, 2.0, 2}, .theta_rad = {0, 4, 4}};
-  EXPECT_EQ(lattice.plane(), 6);
-  EXPECT_EQ(lattice.bins(), 24);
-  std::int64_t bin = 0;
-  for (int t = 0; t < 4; ++t) {
-    for (int j = 0; j < 2; ++j) {
-      for (int i = 0; i < 3; ++i, ++bin) {
-        const Pose pose = lattice.T_object_robot(bin);
-        EXPECT_EQ(pose.translation_mm, glm::dvec2(i + 0.5, j + 0.5));
-        EXPECT_EQ(pose.theta_rad, t + 0.5);
-      }
-    }
-  }
-}
-
 TEST(PoseLattice, PivotHasTheLatticesCoordinatesInTheObjectFrame) {
   const PoseLattice lattice{.x_mm = {-5.0, 5.0, 4},
                             .y_mm = {-3.0, 9.0, 3},
@@ -240,16 +191,6 @@ TEST(PoseLattice, BinsOfAllDimensionsMayExceed32Bits) {
       .x_mm = {0.0, 1.0, 100000}, .y_mm = {0.0, 1.0, 100000}, .theta_rad = {0.0, 1.0, 10}};
   EXPECT_EQ(lattice.bins(), 100000000000);
   EXPECT_NEAR(lattice.T_object_robot(lattice.bins() - 1).theta_rad, 0.95, rounding);
-}
-
-TEST(PoseLattice, ADimensionOfZeroExtentCostsOneBin) {
-  PoseLattice lattice{.x_mm = {3.0, 3.0, 25}, .y_mm = {-1.0, 1.0, 25}, .theta_rad = {0.5, 0.5, 16}};
-  lattice.collapse_fixed();
-  EXPECT_EQ(lattice.x_mm.count, 1);
-  EXPECT_EQ(lattice.y_mm.count, 25);
-  EXPECT_EQ(lattice.theta_rad.count, 1);
-  EXPECT_EQ(lattice.T_object_robot(0).translation_mm.x, 3.0);
-  EXPECT_EQ(lattice.T_object_robot(0).theta_rad, 0.5);
 }
 
 void expect_refused(const PoseLattice& lattice, const char* field) {

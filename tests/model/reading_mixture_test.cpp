@@ -101,32 +101,6 @@ TEST(ReadingMixture, PredictsExactlyWhereAllHypothesesAgree) {
   EXPECT_NEAR(predicted.variance, variance, 1e-9);
 }
 
-TEST(ReadingMixture, PredictsTheMomentsOfItsOwnTouches) {
-  ReadingMixture mixture(64, 12, 2);
-  Random random(3, Stream::readings);
-  for (std::size_t h = 0; h < 64; ++h) {
-    std::vector<double> contact;
-    for (int e = 0; e < 12; ++e) {
-      contact.push_back(random.uniform(0.02, 0.98));
-    }
-    mixture.set(h, logs_of(contact));
-  }
-  const Moments predicted = predicted_log_mean(mixture, mixture, random);
-  const PredictedTouches touches(mixture);
-  constexpr int draws = 6400;
-  double sum = 0.0;
-  double squares = 0.0;
-  for (std::size_t i = 0; i < draws; ++i) {
-    const double judged = mixture.log_mean(touches.draw(i % 64, random).readings);
-    const double out = (judged - predicted.mean) / std::sqrt(predicted.variance);
-    sum += out;
-    squares += out * out;
-  }
-  // The prediction is from 64 touches: four standard errors, of the variance with a kurtosis of 5.
-  EXPECT_NEAR(sum / draws, 0.0, 4.0 / 8.0);
-  EXPECT_NEAR(squares / draws, 1.0, 4.0 * 2.0 / 8.0);
-}
-
 TEST(ReadingMixture, EverySetOfInstructionsGivesTheSameBits) {
   ReadingMixture mixture(14, 3, 2);  // not a whole number of vectors
   Random random(4, Stream::readings);

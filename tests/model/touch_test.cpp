@@ -125,13 +125,6 @@ TEST(TouchEvidence, OfDeadElementsHasNoPressureAndOfTooFewPressuresIsRefused) {
   input_error([&] { TouchEvidence(six.touch(), {}); });
 }
 
-TEST(TouchEvidence, HasTheTouchsFeatures) {
-  const SixElements six;
-  const ContactModel contact{.prior = 0.2};
-  EXPECT_EQ(features_of(TouchEvidence(six.touch(), contact), contact.classifier.threshold).values,
-            press_features(six.touch(), contact.classifier).values);
-}
-
 TEST(FitSums, AreOfEachTouchAndAddUp) {
   const OccupancyGrid map = random_map(31, 27, 0.5, 6.0, 481);
   const ContactModel contact{.prior = 0.2};

@@ -96,11 +96,11 @@ class Bag:
         vector = self.of("geometry_msgs/msg/Vector3", x, y, z)
         return self.of("geometry_msgs/msg/Transform", vector, q)
 
-    def plain(self, topic: str, values: Any, received_s: float, kind: str = "Float32") -> None:
+    def plain(self, topic: str, values: Any, received_s: float) -> None:
         """Writes readings without a time of their own."""
         layout = self.of("std_msgs/msg/MultiArrayLayout", [], 0)
-        row = numpy.array(values, dtype=kind.lower())
-        self.write(topic, self.of(f"std_msgs/msg/{kind}MultiArray", layout, row), received_s)
+        row = numpy.array(values, dtype=numpy.float32)
+        self.write(topic, self.of("std_msgs/msg/Float32MultiArray", layout, row), received_s)
 
     def edge(self, parent: str, child: str, stamp_s: float, *place: Any) -> Any:
         """T_parent_child: x, y, z in m, and a rotation."""

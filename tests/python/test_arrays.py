@@ -208,15 +208,6 @@ def test_results_are_views_that_keep_their_memory(maps: Maps, posterior: palpate
     assert posterior.log_likelihood(0).shape == posterior.lattice.shape == (16, 25, 25)
 
 
-def test_poses_compose() -> None:
-    T_a_b, T_b_c = numpy.array([1.0, 2.0, 0.3]), numpy.array([-4.0, 5.0, 2.0])
-    points = numpy.array([[0.0, 0.0], [3.0, -1.0]])
-    T_a_c = palpate.compose(T_a_b, T_b_c)
-    both = palpate.transform(T_a_b, palpate.transform(T_b_c, points))
-    assert numpy.allclose(both, palpate.transform(T_a_c, points), atol=1e-12)
-    assert numpy.allclose(palpate.compose(T_a_c, palpate.inverse(T_a_c)), 0, atol=1e-12)
-
-
 def test_what_is_no_touch_is_refused(device: palpate.Device, belief: palpate.PoseHistogram) -> None:
     assert "touches: item 0 is a int; give a Touch" in error_of(belief.update, [3])
     said = error_of(palpate.PoseHistogram, device, ["A.map.h5"])

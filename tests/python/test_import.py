@@ -54,7 +54,8 @@ def test_whole_numbers_that_are_no_pressures_are_noticed(tmp_path: pathlib.Path)
 def test_poses_in_space_are_taken_into_the_plane(plain: pathlib.Path, tmp_path: pathlib.Path) -> None:
     (tmp_path / "space.csv").write_text("time,x_m,y_m,z_m,qx,qy,qz,qw\n0,0.001,0.002,0.1,1,0,0,0\n")
     table = {"array": (2, 2, 1), "rate": 1, "poses": tmp_path / "space.csv"}
-    for options in ({}, {"pose_columns": ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")}, {"plane": (0, 0, 1)}):
+    columns = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
+    for options in ({}, {"pose_columns": columns, "pose_unit": ("m", "deg")}, {"plane": (0, 0, 1)}):
         given, said = warned(palpate.import_tables, plain, **table, **options)
         assert "its y is turned over" in said
         assert given.T_robot_sensor[0].tolist() == [1, 2, 0]
@@ -72,6 +73,12 @@ def test_arrays_take_their_times_and_poses() -> None:
     assert (given.rows, given.object) == ("frames", "mug")
     assert given.pressure.tolist() == READINGS.tolist()
     numpy.testing.assert_allclose(given.T_robot_sensor, [[1, 2, 0.1], [2, 3, 0.15], [3, 4, 0.2]], atol=1e-9)
+    gap, said = warned(
+        palpate.import_tables, READINGS, time_s=[0.0, 0.05, 0.1], poses=poses, pose_time_s=[0, 0.1], array=(2, 2, 1),
+        largest_gap_s=0.06,
+    )  # fmt: skip
+    assert "1 of its frames have no pose" in said
+    assert numpy.isnan(gap.T_robot_sensor[:, 0]).tolist() == [False, True, False]
     quaternions = [[1, 2, 0, 0, 0, 0, 1]] * 3
     mounted = palpate.import_tables(
         READINGS, poses=quaternions, array=(2, 2, 1), rows="touches", mount=(1, 0, 0, 0, 0, 0)

@@ -92,21 +92,6 @@ def test_without_a_client_this_process_recognises(
     assert "05b.h5" in broken.record.error and "error" in repr(broken.record)
 
 
-def test_records_are_those_of_recognize(files: Files, recordings: pathlib.Path) -> None:
-    task: palpate.Task = {**REGION, "filter": "bounded", "maps": [files.maps], "trace": True}
-    path = recordings / "03.h5"
-    [result] = palpate.recognize_many([path], task)
-    [record] = palpate.recognize(path, **task)
-    for key in ("seconds", "device"):
-        del record[key]
-    for step in record.get("trace", []):
-        step.pop("seconds", None)
-    # The command names options in warnings as flags.
-    for own in (result.record, record, *result.record["trace"], *record["trace"]):
-        own["warnings"] = len(own.get("warnings", []))
-    assert dict(result.record) == dict(record)
-
-
 @pytest.mark.parametrize("each_frame", [False, True])
 def test_what_all_recordings_tell_together_is_settled_once(
     each_frame: bool, files: Files, recordings: pathlib.Path, tmp_path: pathlib.Path
@@ -123,8 +108,8 @@ def test_what_all_recordings_tell_together_is_settled_once(
         f"path,frames,label\n{recordings}/00.h5,0:2,A\n{recordings}/01.h5,,E\n"
         f"{recordings}/missing.h5,,E\nwide.h5,,\n"
     )
-    task: palpate.Task = {"maps": maps, "each_frame": each_frame, "filter": "bounded"}
-    flags = ["--each-frame"] if each_frame else []
+    task: palpate.Task = {"maps": maps, "each_frame": each_frame, "trace": each_frame, "filter": "bounded"}
+    flags = ["--each-frame", "--trace"] if each_frame else []
     lines = batch(tmp_path, table, maps, "--filter", "bounded", *flags)
     results = list(palpate.recognize_many(table, task, chunk=1))
     assert [result.line for result in results] == lines

@@ -1,11 +1,11 @@
-"""`palpate live --page` and `palpate view`: in a real browser, before other sites and hostile clients."""
+"""`palpate live --page` and `palpate view`: in a real browser, and before other sites. What one client can
+take of the page's server is tested in tests/cli/page_test.cpp."""
 
 import gzip
 import http.client
 import json
 import os
 import pathlib
-import random
 import re
 import signal
 import socket
@@ -282,7 +282,7 @@ def test_saved_files_are_shown(
     assert browser.complaints() == []
 
 
-# Before other sites and hostile clients.
+# Before other sites.
 
 
 @pytest.fixture(scope="module")
@@ -334,45 +334,6 @@ def test_other_sites_and_bad_requests_are_refused(served: Paged) -> None:
     assert request(port, "POST", "/do", '{"do": "' + 5000 * "x" + '"}')[0] == 413
     assert request(port, "POST", "/do", gzip.compress(NEXT.encode()), Content_Encoding="gzip")[0] == 400
     assert request(port, "POST", "/do", NEXT)[0] == 200
-
-
-def hostile(port: int, requests: int, seed: int) -> None:
-    """Sends so many requests of random bytes, and reads what comes back."""
-    generator = random.Random(seed)
-    methods = ["GET", "POST", "HEAD", "TRACE", "G\0T", "", 300 * "M"]
-    paths = ["/events", "/do", "/map/0", "/%", "/" + 9000 * "a", "*", "http://x/"]
-    names = ["Range", "Content-Length", "Transfer-Encoding", "Content-Encoding", "Host", "Expect"]
-    values = ["bytes=0-1,2-3,-", "-1", "chunked", "gzip", "99999999999999999999", 9000 * "v", ""]
-    for _ in range(requests):
-        path = generator.choice([*paths, "/" + generator.randbytes(20).decode("latin-1")])
-        first = f"{generator.choice(methods)} {path} HTTP/1.{generator.randrange(3)}"
-        head = f"{first}\r\nHost: 127.0.0.1:{port}\r\n"
-        for _ in range(generator.randrange(4)):
-            head += f"{generator.choice(names)}: {generator.choice(values)}\r\n"
-        with socket.create_connection(("127.0.0.1", port), timeout=20) as connection:
-            try:
-                connection.sendall(head.encode("latin-1") + b"\r\n" + generator.randbytes(generator.randrange(100)))
-                connection.shutdown(socket.SHUT_WR)
-                connection.recv(4096)
-            except TimeoutError:
-                raise
-            except OSError:
-                pass  # hung up on, and rightly
-
-
-def test_hostile_requests_do_no_harm(live: Callable[..., Paged]) -> None:
-    hosted = live()
-
-    def memory_mib() -> float:
-        pages = pathlib.Path(f"/proc/{hosted.process.pid}/statm").read_text().split()[1]
-        return int(pages) * os.sysconf("SC_PAGE_SIZE") / 2**20
-
-    hostile(hosted.port, 200, seed=1)
-    before = memory_mib()
-    hostile(hosted.port, 300, seed=2)
-    assert memory_mib() < before + 10
-    assert b"<title>Palpate</title>" in request(hosted.port, "GET", "/")[1]
-    assert " frames, 0 lost" in hosted.end()
 
 
 def test_pages_are_capped(served: Paged) -> None:

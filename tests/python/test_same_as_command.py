@@ -1,7 +1,6 @@
 """Functions give the numbers of the commands, bit for bit, and refuse in their words."""
 
 import json
-import math
 import pathlib
 import re
 from collections.abc import Callable
@@ -72,27 +71,6 @@ def test_the_bins_of_a_histogram(files: Files, device: palpate.Device, tmp_path:
     # The record adds how far the maps may be off.
     added = numpy.array(record["refined"]["covariance"]) - refined.covariance
     assert (added.diagonal() >= 0).all()
-
-
-def test_the_rows_of_an_import(tmp_path: pathlib.Path) -> None:
-    pressures, poses = tmp_path / "pressures.csv", tmp_path / "poses.csv"
-    pressures.write_text("time_ms,a,b,c,d\n0,1,2,3,4\n50,5,,7,8\n1900,9,10,11,12\n")
-    poses.write_text("time,px,py,yaw\n0,1,2,0\n0.1,2,3,10\n2,4,5,20\n")
-    command(
-        "import", pressures, "--poses", poses, "--array", "2:2:1.5", "-o", tmp_path / "f.h5",
-        "--pose-columns", "px,py,yaw", "--pose-unit", "m,deg", "--largest-gap-s", 1, "--object", "mug",
-    )  # fmt: skip
-    given, said = warned(
-        palpate.import_tables, pressures, poses=poses, array=(2, 2, 1.5), largest_gap_s=1, object="mug",
-        pose_columns=("px", "py", "yaw"), pose_unit=("m", "deg"),
-    )  # fmt: skip
-    assert "1 of its frames have no pose" in said
-    expected = palpate.read_recording(tmp_path / "f.h5")
-    assert (given.rows, given.object, len(given)) == ("frames", "mug", 3)
-    for name in ("pressure", "T_robot_sensor", "elements_mm", "time_s"):
-        assert numpy.array_equal(getattr(given, name), getattr(expected, name), equal_nan=True), name
-    assert given.T_robot_sensor[1].tolist() == [1500, 2500, math.radians(5)]
-    assert numpy.isnan(given.pressure[1, 1]) and numpy.isnan(given.T_robot_sensor[2]).all()
 
 
 def test_the_bytes_and_words_of_a_folder_of_maps(files: Files, tmp_path: pathlib.Path) -> None:
@@ -194,10 +172,6 @@ REFUSALS: dict[str, tuple[Callable[[Files], object], str, dict[str, str]]] = {
         lambda files: palpate.plan(files.unknown, files.maps, samples=1),
         "plan {0.unknown} --maps {0.maps} --candidates grid --samples 1", {},
     ),
-    "cells_of_a_map": (
-        lambda files: palpate.learn_maps(files.train[0], f"{files.folder}/new/", cell_mm=0.0),
-        "map {0.train[0]} -o {0.folder}/new/ --cell-mm 0", {},
-    ),
     "an_origin_of_unposed_touches": (
         lambda files: palpate.learn_maps(files.train[0], f"{files.folder}/new/", origin=(1, 2, 3), unposed=True),
         "map {0.train[0]} -o {0.folder}/new/ --origin 1,2,3 --unposed", {"--origin 1,2,3": "origin=(1, 2, 3)"},
@@ -210,10 +184,6 @@ REFUSALS: dict[str, tuple[Callable[[Files], object], str, dict[str, str]]] = {
     "units_of_a_table": (
         lambda _: palpate.import_tables("p.csv", array=(2, 2, 1), pose_unit="m,turn"),  # type: ignore[arg-type]
         "import p.csv --array 2:2:1 -o o.h5 --pose-unit m,turn", {"--pose-unit m,turn": "pose_unit='m,turn'"},
-    ),
-    "a_table_that_is_not_there": (
-        lambda _: palpate.import_tables(pathlib.Path("none.csv"), array=(2, 2, 1)),
-        "import none.csv --array 2:2:1 -o o.h5", {},
     ),
     "records_without_truth": (
         lambda files: palpate.evaluate(files.without_truth), "evaluate {0.without_truth}", {},

@@ -30,37 +30,23 @@ double normal_share(double centre, double sd, double from, double to) {
 }
 
 TEST(DrawnMap, IsTheShareOfThePointSpreadOnTheObject) {
-  for (const double spread_mm : {0.25, 0.5, 2.0}) {
-    const DrawnMapOptions options{.spread_mm = spread_mm};
+  const std::pair<DrawnMapOptions, double> felt_from[] = {
+      {{.spread_mm = 0.25}, 0.2}, {{}, 0.2}, {{.spread_mm = 2.0}, 0.2}, {{.felt_share = 0.5}, 0.5}};
+  for (const auto& [options, felt] : felt_from) {
+    const double spread_mm = options.spread_mm;
     const OccupancyGrid map = drawn_map("bar", bar_mask(), options);
     for (int j = 0; j < map.ny; ++j) {
       for (int i = 0; i < map.nx; ++i) {
         const glm::dvec2 at = map.centre_mm(i, j);
         const double share = normal_share(at.x, 2.0 * spread_mm, -10.0, 10.0) *
                              normal_share(at.y, 2.0 * spread_mm, -4.0, 4.0);
-        const double odds = std::pow(share / (1.0 - share) * 4.0, 2.0);  // felt from 0.2 on
+        const double odds = std::pow(share / (1.0 - share) * (1.0 - felt) / felt, 2.0);
         const double p = share > 1.0 - 1e-9 ? options.peak : 0.001 + 0.998 * odds / (1.0 + odds);
         // A float32 share, which is cut off at five standard deviations.
         ASSERT_NEAR(map.at(i, j), std::log(p / (1.0 - p)), 2e-3) << at.x << "," << at.y;
       }
     }
   }
-}
-
-TEST(DrawnMap, IsAsLargeAsElementsFeelTheObject) {
-  const auto height_mm = [](double felt_share) {
-    const DrawnMapOptions options{.cell_mm = 0.1, .felt_share = felt_share};
-    const OccupancyGrid map = drawn_map("bar", bar_mask(), options);
-    int occupied = 0;
-    for (int j = 0; j < map.ny; ++j) {
-      occupied += map.at(map.nx / 2, j) > 0.0F ? 1 : 0;
-    }
-    return 0.1 * occupied;
-  };
-  constexpr double one_cell_mm = 0.11;
-  EXPECT_NEAR(height_mm(0.5), 8.0, one_cell_mm) << "where it is drawn";
-  // A fifth of a normal distribution lies 0.842 standard deviations beyond its mean.
-  EXPECT_NEAR(height_mm(0.2), 8.0 + 2.0 * 0.842, one_cell_mm);
 }
 
 TEST(DrawnMap, CoversWhatAnArrayAboutTheOutlineSensesAndIsNoSurerThanItsPeak) {

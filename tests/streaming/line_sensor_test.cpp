@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "support/errors.hpp"
+#include "support/host_locale.hpp"
 #include "support/limits.hpp"
 
 namespace palpate::line_sensor_test {
@@ -22,9 +23,9 @@ constexpr double now_s = 50.0;
 
 using Lines = std::vector<std::string>;
 
-/// What an array of three elements makes of the last of these lines.
-auto read_last(const Lines& lines) {
-  FrameLines format(3);
+/// What an array of so many elements makes of the last of these lines; 0: poses alone.
+auto read_last(const Lines& lines, std::size_t elements = 3) {
+  FrameLines format(elements);
   for (std::size_t i = 0; i + 1 < lines.size(); ++i) {
     EXPECT_FALSE(std::holds_alternative<FrameLines::Flaw>(format.read(lines[i], now_s)));
   }
@@ -71,15 +72,26 @@ TEST(FrameLines, AreReadInEveryForm) {
        pose},
       {{"7.5,4,5,6,1,2,3"}, {1, 2, 3}, 7.5, pose},
       {{"theta_rad,p0,p1,p2,y_mm,x_mm", "6,1,2,3,5,4"}, {1, 2, 3}, now_s, pose},
-      {{"7.5,,nan,,1,2,3"}, {1, 2, 3}}};
+      {{"7.5,,nan,,1,2,3"}, {1, 2, 3}},
+      // Poses alone, with what else a robot writes
+      {{R"({"time": 7.5, "x_mm": 4, "y_mm": 5, "theta_rad": 6})"}, {}, 7.5, pose},
+      {{"time,x_mm,y_mm,theta_rad", "7.5,4,5,6"}, {}, 7.5, pose},
+      {{"theta_rad, x_mm, time, note, y_mm\r", "6, 4, 7.5, up, 5\r"}, {}, 7.5, pose},
+      {{"7.5,4,5,6"}, {}, 7.5, pose},
+      {{"7.5;4;5;6"}, {}, 7.5, pose},
+      {{"7.5 4 5 6"}, {}, 7.5, pose},
+      {{"7.5,4,5,6,up; or\tdown"}, {}, 7.5, pose},
+      {{"time,x_mm,y_mm,theta_rad", "7.5,4,5,6,up; or\tdown"}, {}, 7.5, pose},
+      {{"time\tx_mm\ty_mm\ttheta_rad", "7.5\t4\t5\t6\tup, or, else"}, {}, 7.5, pose}};
+  const HostLocale locale;  // of a program whose numbers have decimal commas
   for (const FrameCase& row : cases) {
     SCOPED_TRACE(row.lines.back());
-    const auto read = read_last(row.lines);
+    const auto read = read_last(row.lines, row.values.size());
     const auto* frame = std::get_if<Frame>(&read);
     ASSERT_NE(frame, nullptr);
     EXPECT_EQ(frame->host_time_s, row.time_s);
-    ASSERT_EQ(frame->values.size(), 3u);
-    for (std::size_t k = 0; k < 3; ++k) {
+    ASSERT_EQ(frame->values.size(), row.values.size());
+    for (std::size_t k = 0; k < row.values.size(); ++k) {
       EXPECT_EQ(is_known(frame->values[k]), is_known(row.values[k])) << k;
       EXPECT_TRUE(!is_known(row.values[k]) || frame->values[k] == row.values[k]) << k;
     }

@@ -212,4 +212,11 @@ TEST(RestFollower, LearnsAnewWhatIsReadBetweenPresses) {
   EXPECT_FLOAT_EQ(static_cast<float>(follower.rest()[0]), 5.0F);
 }
 
+TEST(RestFollower, StaysWhereNothingDrifts) {
+  RestFollower follower({1.0}, 0.0, 2.0);
+  follower.follow(std::vector{0.5}, 1.0);
+  EXPECT_FALSE(follower.keep(std::vector{0.5}, 20.0));
+  EXPECT_EQ(follower.rest(), std::vector{1.0});
+}
+
 }  // namespace palpate::rest_finder_test

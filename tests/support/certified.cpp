@@ -15,15 +15,6 @@ namespace palpate {
 
 namespace {
 
-double log_sum(std::span<const double> logs) {
-  const double most = *std::max_element(logs.begin(), logs.end());
-  double sum = 0.0;
-  for (const double l : logs) {
-    sum += std::exp(l - most);
-  }
-  return most + std::log(sum);
-}
-
 /// log of every prior weight over their sum.
 std::vector<double> log_prior(const std::vector<double>& weights) {
   const double largest = *std::max_element(weights.begin(), weights.end());

@@ -80,6 +80,15 @@ double largest_difference(std::span<const double> a, std::span<const double> b) 
   return most;
 }
 
+double log_sum(std::span<const double> logs) {
+  const double most = *std::max_element(logs.begin(), logs.end());
+  double sum = 0.0;
+  for (const double l : logs) {
+    sum += std::exp(l - most);
+  }
+  return most + std::log(sum);
+}
+
 reference::Posterior reference_posterior(std::span<const Hypothesis> hypotheses,
                                          const HistogramOptions& options,
                                          std::span<const Touch> touches) {

@@ -55,6 +55,9 @@ Recording moved(Recording recording, const Pose& T_moved_robot);
 /// Largest absolute difference, element by element; infinite where the sizes differ.
 double largest_difference(std::span<const double> a, std::span<const double> b);
 
+/// log of the sum of exp(l), of one number at least.
+double log_sum(std::span<const double> logs);
+
 /// Log-likelihoods of all objects after the touches, [object][bin], from the reference.
 reference::Posterior reference_posterior(std::span<const Hypothesis> hypotheses,
                                          const HistogramOptions& options,

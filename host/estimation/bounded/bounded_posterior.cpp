@@ -99,9 +99,7 @@ struct BoundedPosterior::Impl : BoundedBelief {
 
 BoundedPosterior::BoundedPosterior(std::span<const Hypothesis> hypotheses,
                                    const BoundedOptions& options)
-    : impl_(new Impl(hypotheses, checked(options, hypotheses))) {}
-
-void BoundedPosterior::Deleter::operator()(Impl* impl) const { delete_here(impl); }
+    : impl_(new Impl(hypotheses, checked(options, hypotheses)), delete_here<Impl>) {}
 
 BoundedPosterior::Impl& BoundedPosterior::impl() const {
   return held_here(impl_, "bounded posterior");

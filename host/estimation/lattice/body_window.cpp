@@ -7,6 +7,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "model/body_spread.hpp"
+
 namespace palpate {
 
 namespace {
@@ -34,12 +36,6 @@ Range around_circle(int centre, int steps, const Axis& axis) {
   const int before = std::min(steps, (axis.count - 1) / 2);
   const int after = std::min(steps, axis.count / 2);
   return {centre - before, before + after + 1};
-}
-
-double spin_mm(const Body& body) { return std::sqrt(std::max(body.inertia_mm2, 1e-12)); }
-
-glm::dvec2 lever_mm(const Body& body, const glm::dvec3& place) {
-  return body.centroid_mm - glm::dvec2(place);
 }
 
 /// Bins whose distance from the centre bin is within [first, last].
@@ -93,7 +89,7 @@ std::vector<BinBox> boxes_around(const PoseLattice& lattice, int object, const B
 }  // namespace
 
 BodyMotion::BodyMotion(const Body& body, const glm::dvec3& place)
-    : lever_mm_(lever_mm(body, place)), spin_mm_(spin_mm(body)) {}
+    : lever_mm_(body.centroid_mm - glm::dvec2(place)), spin_mm_(spin_mm(body)) {}
 
 glm::dvec2 BodyMotion::swing_mm(double turn_rad) const {
   return rotate(turn_rad, lever_mm_) - lever_mm_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -29,17 +30,6 @@ VkDeviceSize bytes_per_element(const PoseLattice& lattice) {
   return static_cast<VkDeviceSize>(lattice.theta_rad.count) * sizeof(shaders::RotatedElement);
 }
 
-/// Every object's first bin in its slab.
-std::vector<std::uint32_t> first_bins_of(const DenseBelief& belief, std::size_t objects) {
-  std::vector<std::uint32_t> bins;
-  for (std::size_t object = 0; object < objects; ++object) {
-    const auto slab = std::find_if(belief.slabs().begin(), belief.slabs().end(),
-                                   [&](const Slab& s) { return s.holds(object); });
-    bins.push_back(static_cast<std::uint32_t>(slab->first_bin(object)));
-  }
-  return bins;
-}
-
 /// How kernels read the map. Throws Error where the device has no way.
 gpu::Access access_of(const gpu::Context& context, const OccupancyGrid& map) {
   const gpu::Limits& limits = context.limits();
@@ -51,10 +41,6 @@ gpu::Access access_of(const gpu::Context& context, const OccupancyGrid& map) {
       fmt::format("map '{}': {} x {} cells exceed the {} that kernels of device '{}' read in one "
                   "buffer; build it with larger cells",
                   map.label, map.nx, map.ny, most_map_cells(limits), context.name()));
-}
-
-std::size_t axis_bins(const PoseLattice& lattice) {
-  return static_cast<std::size_t>(lattice.x_mm.count) + lattice.y_mm.count;
 }
 
 constexpr std::uint32_t longest_run = 8;
@@ -87,11 +73,6 @@ Tile tile_within(std::uint32_t cells, const glm::dvec2& step_cells, const PoseLa
   return tile;
 }
 
-/// Fewest bins with which a tile is faster than runs of bins. On a CPU device a run takes as long
-/// as a tile of nine over two cells, measured. A GPU waits for fetches: a tile has four, a run one
-/// a bin.
-std::uint32_t least_bins(const gpu::Limits& limits) { return limits.cpu ? 10 : 5; }
-
 /// The run length that covers a row with the fewest bins beyond its end, the longest of equals.
 std::uint32_t run_for(std::uint32_t nx, std::uint32_t longest) {
   std::uint32_t best = 1;
@@ -113,7 +94,8 @@ std::vector<MapGroup> group_maps(const gpu::Context& context,
   const gpu::Limits& limits = context.limits();
   const std::size_t most_places =
       std::min(limits.storage_range, limits.allocation) / sizeof(shaders::Split);
-  const std::size_t most_objects = most_places / axis_bins(lattice);
+  const std::size_t most_objects =
+      most_places / (static_cast<std::size_t>(lattice.x_mm.count) + lattice.y_mm.count);
   if (most_objects == 0) {
     const bool x = lattice.x_mm.count > lattice.y_mm.count;
     throw Error(Fault::input,
@@ -125,16 +107,15 @@ std::vector<MapGroup> group_maps(const gpu::Context& context,
   std::vector<MapGroup> groups;
   for (std::size_t object = 0; object < hypotheses.size(); ++object) {
     const OccupancyGrid& map = hypotheses[object].compared();
-    const MapKind kind{map.cell_mm, access_of(context, map)};
-    const std::uint64_t cells = bordered_cells(map);
-    const std::uint64_t limit = most_map_cells(limits, kind.access);
-    const auto group = std::find_if(groups.begin(), groups.end(), [&](const MapGroup& g) {
-      return g.kind == kind && g.cells + cells <= limit && g.objects.size() < most_objects;
+    const MapGroup own{map.cell_mm, access_of(context, map), bordered_cells(map), {object}};
+    const std::uint64_t limit = most_map_cells(limits, own.access);
+    const auto group = std::ranges::find_if(groups, [&](const MapGroup& g) {
+      return g.alike(own) && g.cells + own.cells <= limit && g.objects.size() < most_objects;
     });
     if (group == groups.end()) {
-      groups.push_back({kind, cells, {object}});
+      groups.push_back(own);
     } else {
-      group->cells += cells;
+      group->cells += own.cells;
       group->objects.push_back(object);
     }
   }
@@ -143,13 +124,13 @@ std::vector<MapGroup> group_maps(const gpu::Context& context,
 
 /// Chooses neighbouring bins in register tiles or, where too few bins lie side by side within two
 /// of the map's cells, runs of bins of a row.
-/// @param objects whose bins a dispatch takes together
-LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
-                           const MapKind& maps, const ContactModel& model) {
+/// @param maps of the objects whose bins a dispatch takes together
+LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, const MapGroup& maps,
+                           const ContactModel& model) {
   const gpu::Limits& limits = context.limits();
   const glm::dvec2 step_cells = glm::dvec2(lattice.x_mm.step(), lattice.y_mm.step()) / maps.cell_mm;
   const std::uint32_t most_bins =
-      most_bins_per_invocation(limits, lattice.bins() * static_cast<std::int64_t>(objects));
+      most_bins_per_invocation(limits, lattice.bins() * std::ssize(maps.objects));
   Tile tile = tile_within(1, step_cells, lattice, most_bins);
   // Sixteen nodes in the place of nine cost a fifth more a bin, but are shared: measured, 5 x 5
   // bins over two cells take three quarters of the time of 3 x 3 over one, and as long as 4 x 4.
@@ -157,7 +138,9 @@ LikelihoodPath choose_path(gpu::Context& context, const PoseLattice& lattice, st
       wide.bins() >= 2 * tile.bins()) {
     tile = wide;
   }
-  const bool tiled = tile.bins() >= least_bins(limits);
+  // On a CPU device a run of bins takes as long as a tile of nine over two cells, measured. A GPU
+  // waits for fetches: a tile has four, a run one a bin.
+  const bool tiled = tile.bins() >= (limits.cpu ? 10U : 5U);
   if (!tiled) {
     const auto nx = static_cast<std::uint32_t>(lattice.x_mm.count);
     tile = {.cells = 0, .x = run_for(nx, std::min(longest_run, most_bins)), .y = 1};
@@ -227,20 +210,21 @@ DenseLikelihood::DenseLikelihood(gpu::Context& context, gpu::CommandStream& stre
       objects_(hypotheses.size()),
       contact_(context, stream, model),
       batch_elements_(batch_for(context, lattice, hypotheses.size())) {
-  const std::vector<std::uint32_t> first_bins = first_bins_of(belief, hypotheses.size());
   for (MapGroup& maps : group_maps(context, hypotheses, lattice)) {
-    LikelihoodPath path = choose_path(context, lattice, maps.objects.size(), maps.kind, model);
-    BorderedMaps nodes(context, maps.kind.access, maps.cells,
+    LikelihoodPath path = choose_path(context, lattice, maps, model);
+    BorderedMaps nodes(context, maps.access, maps.cells,
                        fmt::format("map '{}'", hypotheses[maps.objects.front()].map.label));
     std::vector<shaders::Split> axes;
     std::vector<shaders::ObjectPlace> places;
     for (const std::size_t object : maps.objects) {
       const OccupancyGrid& map = hypotheses[object].compared();
+      const auto slab =
+          std::ranges::find_if(belief.slabs(), [&](const Slab& s) { return s.holds(object); });
       places.push_back({.first_node = nodes.add(stream, map, *model.prior),
                         .map_width = map.nx + 2 * shaders::MAP_BORDER,
                         .map_height = map.ny + 2 * shaders::MAP_BORDER,
                         .first_axis = static_cast<shaders::uint>(axes.size()),
-                        .first_bin = first_bins[object],
+                        .first_bin = static_cast<shaders::uint>(slab->first_bin(object)),
                         .first_table_node = contact_.first_node(object)});
       const std::vector<shaders::Split> own_axes = axes_in_cells(map, lattice);
       axes.insert(axes.end(), own_axes.begin(), own_axes.end());
@@ -333,7 +317,7 @@ void DenseLikelihood::accumulate(const KnownElements& known, const DenseBelief& 
 
     for (const Group& group : groups_) {
       rotated_ = rotated_elements(std::span(known.from_pivot_mm).subspan(first, elements),
-                                  lattice_.theta_rad, group.kind.cell_mm, std::move(rotated_));
+                                  lattice_.theta_rad, group.cell_mm, std::move(rotated_));
       stream_.upload(elements_, rotated_);
       for (const Slab& slab : belief.slabs()) {
         const Range range = within(group, slab);
@@ -341,7 +325,7 @@ void DenseLikelihood::accumulate(const KnownElements& known, const DenseBelief& 
           continue;
         }
         dispatch(group, range, slab, batch_.size(), elements);
-        pending += work_of(range, slab, elements);
+        pending += static_cast<double>(range.count * slab.bins()) * static_cast<double>(elements);
         if (pending > work_per_run(context_.limits())) {
           stream_.run();
           done += pending;
@@ -360,7 +344,7 @@ std::vector<std::string> DenseLikelihood::paths() const {
   std::vector<std::string> descriptions;
   for (auto group = groups_.begin(); group != groups_.end(); ++group) {
     // Maps of one kind may need several groups.
-    const auto same = [&](const Group& earlier) { return earlier.kind == group->kind; };
+    const auto same = [&](const Group& earlier) { return earlier.alike(*group); };
     if (std::none_of(groups_.begin(), group, same)) {
       descriptions.push_back(group->path.description);
     }

@@ -26,21 +26,18 @@ struct LikelihoodPath {
   std::string description;  ///< what it does and why it was chosen
 };
 
-/// What a path is made for: maps of one cell size that kernels read in one way.
-struct MapKind {
+/// Objects whose maps are of one cell size, read by kernels in one way, and, like their axes,
+/// together no larger than what a kernel reads at once.
+struct MapGroup {
   double cell_mm = 0.0;
   /// Tables are the fast way, which not every device has for large maps.
   gpu::Access access = gpu::Access::table;
-
-  bool operator==(const MapKind&) const = default;
-};
-
-/// Objects whose maps are of one kind and, like their axes, together no larger than what a kernel
-/// reads at once.
-struct MapGroup {
-  MapKind kind;
   std::uint64_t cells = 0;           ///< that the maps take in a buffer
   std::vector<std::size_t> objects;  ///< ascending
+
+  bool alike(const MapGroup& other) const {
+    return cell_mm == other.cell_mm && access == other.access;
+  }
 };
 
 /// The log-likelihood of touches at every bin of the lattice, for several maps (Eq. 7).
@@ -86,10 +83,6 @@ class DenseLikelihood {
   };
 
   static Range within(const Group& group, const Slab& slab);
-  /// Products of bins and elements.
-  static double work_of(const Range& range, const Slab& slab, std::size_t elements) {
-    return static_cast<double>(range.count * slab.bins()) * static_cast<double>(elements);
-  }
   /// Records one run of the group's kernel over its objects in a slab.
   void dispatch(const Group& group, const Range& range, const Slab& slab, std::size_t segments,
                 std::size_t elements);

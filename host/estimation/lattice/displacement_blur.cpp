@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -88,14 +89,14 @@ const Slab& slab_with(std::span<const Slab> slabs, std::uint32_t object, std::ui
   });
 }
 
-std::uint64_t turns_of(const PoseLattice& lattice, std::size_t objects, int steps) {
-  return std::max<std::uint64_t>(objects, static_cast<std::uint64_t>(lattice.theta_rad.count)) *
-         (2 * static_cast<std::uint64_t>(steps) + 1);
-}
-
-/// Throws Error where no buffer holds as many turns.
-gpu::Buffer turn_buffer(gpu::Context& context, std::uint64_t turns) {
+/// Room for the turns of every theta, or of every object, by as many steps. Throws Error where no
+/// buffer holds them.
+gpu::Buffer turn_buffer(gpu::Context& context, const PoseLattice& lattice, std::size_t objects,
+                        int steps) {
   const gpu::Limits& limits = context.limits();
+  const std::uint64_t turns =
+      std::max<std::uint64_t>(objects, static_cast<std::uint64_t>(lattice.theta_rad.count)) *
+      (2 * static_cast<std::uint64_t>(steps) + 1);
   const std::uint64_t bytes = turns * sizeof(shaders::TurnedPlane);
   const VkFormat texel = gpu::table_where_it_fits(limits, bytes, VK_FORMAT_R32G32B32A32_SFLOAT);
   if (texel == VK_FORMAT_UNDEFINED && bytes > limits.storage_range) {
@@ -176,7 +177,7 @@ DisplacementBlur::DisplacementBlur(gpu::Context& context, gpu::CommandStream& st
       // A slip takes each bin from a place of its own: neighbours share no reads.
       turn_rows_(slips_ ? 1 : 4),
       turn_columns_(slips_ ? 1 : 2),
-      turns_(turn_buffer(context, turns_of(lattice, objects, weights_.theta_steps()))),
+      turns_(turn_buffer(context, lattice, objects, weights_.theta_steps())),
       plane_max_(maxima_buffer(
           context, planes() + 2 * (static_cast<std::size_t>(weights_.theta_steps()) + 1))),
       references_(context, objects * sizeof(TwoFloat), gpu::Memory::device, "maxima of objects",
@@ -269,7 +270,7 @@ void DisplacementBlur::turn_for(const glm::dvec2& sensor_from_pivot_mm) {
   host_turns_.assign(static_cast<std::size_t>(thetas) * turns,
                      {.whole_x = beyond, .whole_y = beyond});
   for (int theta = 0; theta < thetas; ++theta) {
-    weights_.find_taps(theta, sensor_from_pivot_mm, taps_);
+    taps_ = weights_.taps(theta, sensor_from_pivot_mm, std::move(taps_));
     for (const Tap& tap : taps_) {
       shaders::TurnedPlane& turn =
           host_turns_[static_cast<std::size_t>(theta) * turns + tap.steps + steps];

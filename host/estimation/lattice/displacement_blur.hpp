@@ -9,8 +9,8 @@
 #include "estimation/kernel_sizes.hpp"
 #include "estimation/lattice/dense_belief.hpp"
 #include "gpu/command_stream.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"
+#include "palpate/pose.hpp"
 #include "shaders/interface.h"
 
 namespace palpate {

@@ -9,12 +9,13 @@
 #include <numbers>
 #include <numeric>
 #include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 
-#include "model/contact_readings.hpp"
 #include "model/displacement_points.hpp"
 #include "model/random.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -53,12 +54,6 @@ float fast_exp(float x) {
   return mantissa * std::bit_cast<float>((std::clamp(whole, -126, 127) + 127) << 23);
 }
 
-/// Samples of one label, which stand together.
-struct LabelBlock {
-  std::size_t first = 0;
-  std::size_t end = 0;
-};
-
 /// The samples, and all the random numbers that every candidate shares.
 struct SampledBelief {
   SampledBelief(std::span<const PoseSample> drawn, std::size_t elements,
@@ -71,17 +66,13 @@ struct SampledBelief {
     std::ranges::stable_sort(samples, {}, label);
     for (std::size_t i = 0; i < samples.size(); ++i) {
       if (i == 0 || label(samples[i]) != label(samples[i - 1])) {
-        blocks.push_back({i, i});
+        blocks.emplace_back(i, i);
       }
-      blocks.back().end = i + 1;
+      blocks.back().second = i + 1;
     }
+    // Every element's numbers fall into `samples` equal parts, one into each (Latin hypercube):
+    // less noise than with independent numbers, and no bias.
     Random random(options.seed, Stream::readings);
-    draw_uniforms(elements, random);
-  }
-
-  /// Every element's numbers fall into `samples` equal parts, one into each (Latin hypercube):
-  /// less noise than with independent numbers, and no bias.
-  void draw_uniforms(std::size_t elements, Random& random) {
     const std::size_t n = samples.size();
     uniforms.resize(n * elements);
     std::vector<std::size_t> part(n);
@@ -99,29 +90,27 @@ struct SampledBelief {
     }
   }
 
-  std::vector<PoseSample> samples;  ///< ordered by label
-  std::vector<LabelBlock> blocks;
-  std::vector<Pose> displacements;  ///< of equal probability
-  std::vector<float> uniforms;      ///< [sample, element] that decide the readings
+  std::vector<PoseSample> samples;                          ///< ordered by label
+  std::vector<std::pair<std::size_t, std::size_t>> blocks;  ///< [label] first sample and end
+  std::vector<Pose> displacements;                          ///< of equal probability
+  std::vector<float> uniforms;  ///< [sample, element] that decide the readings
 };
 
 /// The mean of terms, and its standard error.
-class Mean {
- public:
+struct Mean {
   void add(double term) {
-    sum_ += term;
-    squares_ += term * term;
-    ++count_;
+    sum += term;
+    squares += term * term;
+    ++count;
   }
-  double mean() const { return sum_ / count_; }
+  double mean() const { return sum / count; }
   double standard_error() const {
-    return std::sqrt(std::max(squares_ - sum_ * mean(), 0.0) / (count_ - 1.0) / count_);
+    return std::sqrt(std::max(squares - sum * mean(), 0.0) / (count - 1.0) / count);
   }
 
- private:
-  double sum_ = 0.0;
-  double squares_ = 0.0;
-  double count_ = 0.0;
+  double sum = 0.0;
+  double squares = 0.0;
+  double count = 0.0;
 };
 
 /// One thread's work on candidates, with its memory.
@@ -296,22 +285,20 @@ void require_plan(std::span<const Pose> T_robot_sensor, std::span<const glm::dve
   if (elements_mm.empty()) {
     throw Error(Fault::input, "the candidates' array has no living element: give at least one");
   }
-  const auto is_finite = [](const glm::dvec2& p) {
-    return std::isfinite(p.x) && std::isfinite(p.y);
-  };
   for (std::size_t i = 0; i < T_robot_sensor.size(); ++i) {
-    const Pose& pose = T_robot_sensor[i];
-    if (!is_finite(pose.translation_mm) || !std::isfinite(pose.theta_rad)) {
+    const auto& [mm, rad] = T_robot_sensor[i];
+    if (!std::isfinite(mm.x) || !std::isfinite(mm.y) || !std::isfinite(rad)) {
       throw Error(Fault::input,
                   fmt::format("candidate {}: its pose [{}, {}, {}] is not finite; leave it out", i,
-                              pose.translation_mm.x, pose.translation_mm.y, pose.theta_rad));
+                              mm.x, mm.y, rad));
     }
   }
   for (std::size_t i = 0; i < elements_mm.size(); ++i) {
-    if (!is_finite(elements_mm[i])) {
+    const glm::dvec2& mm = elements_mm[i];
+    if (!std::isfinite(mm.x) || !std::isfinite(mm.y)) {
       throw Error(Fault::input, fmt::format("element {} of the candidates' array: [{}, {}] mm is "
                                             "not finite; leave it out",
-                                            i, elements_mm[i].x, elements_mm[i].y));
+                                            i, mm.x, mm.y));
     }
   }
   if (options.samples < 2 || options.samples > most_samples) {

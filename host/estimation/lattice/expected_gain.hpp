@@ -7,9 +7,7 @@
 
 #include "model/map_likelihood.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
-#include "palpate/plan.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/pose_error.hpp"
 

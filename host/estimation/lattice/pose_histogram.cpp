@@ -159,30 +159,27 @@ struct PoseHistogram::Impl {
     return normalised(std::move(evidence));
   }
 
-  /// Eq. 15-16: the bin of the largest posterior probability; of equal bins the first object's.
-  Mode mode() {
-    Mode mode;
+  Estimate estimate() {
+    Estimate all{
+        .identity = identity(), .log_evidence = log_evidence(), .mode = {}, .contradicted = true};
+    // Eq. 15-16: the bin of the largest posterior probability; of equal bins the first object's.
     double largest = -std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < log_weight.size(); ++i) {
       const BeliefSummary& summary = summaries()[i];
-      const double log_likelihood = summary.max.value() + lost_mass(i);
-      if (log_weight[i] + log_likelihood > largest) {
-        largest = log_weight[i] + log_likelihood;
-        mode = {.object = static_cast<int>(i),
-                .bin = summary.arg_max,
-                .T_object_robot = options.lattice.T_object_robot(summary.arg_max),
-                .log_likelihood = log_likelihood};
+      const double best = summary.max.value() + lost_mass(i);
+      all.contradicted = all.contradicted && prior_log_likelihood - best > contradiction_nats;
+      if (log_weight[i] + best > largest) {
+        largest = log_weight[i] + best;
+        all.mode = {.object = static_cast<int>(i),
+                    .bin = summary.arg_max,
+                    .T_object_robot = options.lattice.T_object_robot(summary.arg_max),
+                    .log_likelihood = best};
       }
     }
-    return mode;
-  }
-
-  /// True where the prior alone explains the touches far better than the best bin of any object.
-  bool contradicted() {
-    bool all = true;
-    for (std::size_t i = 0; i < log_weight.size(); ++i) {
-      const double best = summaries()[i].max.value() + lost_mass(i);
-      all = all && prior_log_likelihood - best > contradiction_nats;
+    if (none_log_weight) {
+      all.none = all.identity.back();
+      all.identity.pop_back();
+      all.none_log_evidence = none_log_evidence();
     }
     return all;
   }
@@ -218,10 +215,8 @@ PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypothe
                                           *checked.none_weight));
   }
   require_room(device.context(), checked, hypotheses.size());
-  impl_.reset(new Impl(device, hypotheses, checked));
+  impl_ = {new Impl(device, hypotheses, checked), delete_here<Impl>};
 }
-
-void PoseHistogram::Deleter::operator()(Impl* impl) const { delete_here(impl); }
 
 PoseHistogram::Impl& PoseHistogram::impl() const { return held_here(impl_, "histogram"); }
 
@@ -264,19 +259,7 @@ void PoseHistogram::update(std::span<const TouchEvidence> touches,
   unbroken().update(touches, progress);
 }
 
-Estimate PoseHistogram::estimate() const {
-  Impl& histogram = unbroken();
-  Estimate estimate{.identity = histogram.identity(),
-                    .log_evidence = histogram.log_evidence(),
-                    .mode = histogram.mode(),
-                    .contradicted = histogram.contradicted()};
-  if (histogram.none_log_weight) {
-    estimate.none = estimate.identity.back();
-    estimate.identity.pop_back();
-    estimate.none_log_evidence = histogram.none_log_evidence();
-  }
-  return estimate;
-}
+Estimate PoseHistogram::estimate() const { return unbroken().estimate(); }
 
 RefinedPose PoseHistogram::refine(const Mode& mode) const {
   Impl& histogram = unbroken();

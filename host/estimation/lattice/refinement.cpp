@@ -16,6 +16,7 @@
 #include <glm/matrix.hpp>
 #include <glm/vec3.hpp>
 
+#include "model/body_spread.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -268,15 +269,7 @@ std::array<double, 9> pose_covariance(const glm::dmat3& moment, const PoseLattic
       -rotate(theta_rad + std::numbers::pi / 2.0, lattice.pivot_mm);  // d translation / d theta
   glm::dmat3 jacobian{1.0};
   jacobian[2] = {slope, 1.0};  // the third column
-  const glm::dmat3 covariance = jacobian * moment * glm::transpose(jacobian);
-  std::array<double, 9> rows{};
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      // Rounding must not leave it unsymmetric.
-      rows[3 * row + column] = (covariance[column][row] + covariance[row][column]) / 2.0;
-    }
-  }
-  return rows;
+  return carried_over(moment, jacobian);
 }
 
 double on_circle(const Axis& theta, double theta_rad) {

@@ -13,34 +13,26 @@ namespace palpate {
 
 namespace {
 
-/// log of the sum of weight * sum over all objects.
-double weighted_log_sum(std::span<const OverlapSum> sums, std::span<const double> log_weight) {
-  double largest = -std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < sums.size(); ++i) {
-    largest = std::max(largest, log_weight[i] + sums[i].log_sum);
-  }
-  double sum = 0.0;
-  for (std::size_t i = 0; i < sums.size(); ++i) {
-    sum += std::exp(log_weight[i] + sums[i].log_sum - largest);
-  }
-  return largest + std::log(sum);
-}
-
-/// The number of bins, weighted by the objects' prior probabilities.
-double weighted_bins(std::span<const OverlapSum> sums, std::span<const double> log_weight) {
-  double bins = 0.0;
-  for (std::size_t i = 0; i < sums.size(); ++i) {
-    bins += std::exp(log_weight[i]) * static_cast<double>(sums[i].bins);
-  }
-  return bins;
-}
-
 using gpu::Access;
 
-/// Partial results of all slabs: one for each plane.
-std::size_t partials_of(const PoseLattice& lattice, std::size_t objects) {
-  return objects * static_cast<std::size_t>(lattice.theta_rad.count);
-}
+/// The sums of all objects together, by their prior probabilities.
+struct WeightedSum {
+  WeightedSum(std::span<const OverlapSum> sums, std::span<const double> log_weight) {
+    double largest = -std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      largest = std::max(largest, log_weight[i] + sums[i].log_sum);
+      bins += std::exp(log_weight[i]) * static_cast<double>(sums[i].bins);
+    }
+    double sum = 0.0;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      sum += std::exp(log_weight[i] + sums[i].log_sum - largest);
+    }
+    log_sum = largest + std::log(sum);
+  }
+
+  double log_sum = 0.0;
+  double bins = 0.0;
+};
 
 std::vector<shaders::ObjectBox> boxes_of(std::span<const Hypothesis> hypotheses) {
   std::vector<shaders::ObjectBox> boxes;
@@ -150,15 +142,14 @@ void TouchByTouch::slip(DenseBelief& belief) {
 }
 
 void TouchByTouch::add_to_none(const ArrayRectangle& array) {
-  std::span<const OverlapSum> sums = overlap_->sums(scratch_, array, false);
-  if (weighted_bins(sums, log_weight_) == 0.0) {
+  WeightedSum all(overlap_->sums(scratch_, array, false), log_weight_);
+  if (all.bins == 0.0) {
     // No pose of the region brings the array to an object: all poses are alike.
-    sums = overlap_->sums(scratch_, array, true);
+    all = {overlap_->sums(scratch_, array, true), log_weight_};
   }
-  const double bins = weighted_bins(sums, log_weight_);
-  none_log_evidence_ += weighted_log_sum(sums, log_weight_) - std::log(bins);
+  none_log_evidence_ += all.log_sum - std::log(all.bins);
   if (!felt_) {
-    none_log_evidence_ += std::log(bins / static_cast<double>(options_.lattice.bins()));
+    none_log_evidence_ += std::log(all.bins / static_cast<double>(options_.lattice.bins()));
     felt_ = true;
   }
 }
@@ -184,9 +175,9 @@ OverlapMean::OverlapMean(gpu::Context& context, gpu::CommandStream& stream,
               gpu::Memory::device, "arrays", VK_FORMAT_R32G32B32A32_SFLOAT),
       boxes_(
           stream.uploaded(boxes_of(hypotheses), "boxes of objects", VK_FORMAT_R32G32B32A32_SFLOAT)),
-      partials_(context, partials_of(lattice, objects_) * sizeof(shaders::OverlapPartial),
-                gpu::Memory::device, "sums of planes"),
-      read_partials_(partials_of(lattice, objects_)) {
+      read_partials_(objects_ * static_cast<std::size_t>(lattice.theta_rad.count)),
+      partials_(context, std::span(read_partials_).size_bytes(), gpu::Memory::device,
+                "sums of planes") {
   // The first run, at which drivers compile the kernel.
   sums(belief, {}, false);
 }

@@ -49,10 +49,10 @@ class OverlapMean {
   gpu::Kernel kernel_;
   gpu::Buffer arrays_;
   gpu::Buffer boxes_;
+  std::vector<shaders::OverlapPartial> read_partials_;  ///< of each plane of each slab
   gpu::Buffer partials_;
   // Memory that calls share.
   std::vector<shaders::ArrayAtTheta> placed_;
-  std::vector<shaders::OverlapPartial> read_partials_;
   std::vector<double> largest_;
   std::vector<double> sum_;
   std::vector<OverlapSum> sums_;

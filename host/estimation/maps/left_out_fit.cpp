@@ -17,9 +17,9 @@
 
 #include "estimation/lattice/refinement.hpp"
 #include "model/body_spread.hpp"
-#include "model/contact_readings.hpp"
 #include "model/map_likelihood.hpp"
 #include "model/random.hpp"
+#include "model/touch_evidence.hpp"
 
 namespace palpate {
 
@@ -58,12 +58,12 @@ std::optional<FitScale> scale_of(std::span<const double> z) {
 }
 
 std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, const Hypothesis& of,
-                                     const ContactModel& model, std::size_t object) {
+                                     const ContactModel& model) {
   constexpr std::array<std::size_t, 3> in_group{3, 9, 27};
   constexpr std::size_t most_touches = 54;  // in all groups of a size
   constexpr double another_peak_mm = 1.5;
   constexpr double wide_mm = 0.8;
-  const MapLikelihood likelihood(of.compared(), tabulated(model), object);
+  const MapLikelihood likelihood(of.compared(), tabulated(model));
   const Body body = displaced_body(of.map);
   const PoseLattice lattice = lattice_about(body);
   std::vector<PlaceError> errors;
@@ -180,9 +180,10 @@ void judge_left_out(Device& device, MapSource& source) {
     return;
   }
   MapBuilder builder(device, source.options);
-  // Judges touches on maps of the others. Touches of one part are left out together.
+  // Judges touches on maps of the others: how they fit, and where they seem to lie, each where it
+  // is asked for. Touches of one part are left out together.
   const auto leave_out = [&](std::span<const std::size_t> part, std::size_t least_parts,
-                             const auto& judge) {
+                             std::vector<double>* z, std::vector<PlaceError>* errors) {
     const std::size_t count = std::ranges::max(part) + 1;
     std::size_t all_judged = 0;
     for (std::size_t left_out = 0;
@@ -198,31 +199,27 @@ void judge_left_out(Device& device, MapSource& source) {
       }
       builder.clear();
       builder.add(others);
-      judge(Hypothesis{.map = builder.build(source.touches.object)}, judged);
+      const Hypothesis of{.map = builder.build(source.touches.object)};
+      for (const TouchEvidence& touch : judged) {
+        if (z != nullptr) {
+          z->push_back(evidence_fit(std::span(&touch, 1), Pose{}, of.map, contact, {}, 0)->z);
+        }
+      }
+      if (errors != nullptr) {
+        std::ranges::move(place_errors(judged, of, contact), std::back_inserter(*errors));
+      }
       all_judged += judged.size();
     }
   };
   std::vector<double> z;
-  const auto judge_fit = [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
-    for (const TouchEvidence& touch : judged) {
-      z.push_back(evidence_fit(std::span(&touch, 1), Pose{}, of.map, contact, {}, 0)->z);
-    }
-  };
   std::vector<PlaceError> errors;
-  const auto judge_places = [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
-    std::ranges::move(place_errors(judged, of, contact, 0), std::back_inserter(errors));
-  };
   if (const std::vector<std::size_t> group = groups_of(source); !group.empty()) {
-    leave_out(group, groups_judged,
-              [&](const Hypothesis& of, std::span<const TouchEvidence> judged) {
-                judge_fit(of, judged);
-                judge_places(of, judged);
-              });
+    leave_out(group, groups_judged, &z, &errors);
   } else {
     std::vector<std::size_t> each(touches.size());
     std::iota(each.begin(), each.end(), std::size_t{0});
-    leave_out(random_parts(each), 0, judge_fit);
-    leave_out(random_parts(places_of(evidence, parts)), 0, judge_places);
+    leave_out(random_parts(each), 0, &z, nullptr);
+    leave_out(random_parts(places_of(evidence, parts)), 0, nullptr, &errors);
   }
   source.left_out = scale_of(z);
   source.pose_scale = pose_scale_of(errors);

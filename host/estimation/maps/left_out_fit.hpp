@@ -29,9 +29,8 @@ struct PlaceError {
 /// are groups that lie more than 1.5 mm away, at another peak, and those of a belief 0.8 mm wide.
 /// @param touches T_robot_sensor is of the sensor in the object frame
 /// @param contact with a prior, by which the touches are classified
-/// @param object index of the object whose numbers of a table are used
 std::vector<PlaceError> place_errors(std::span<const TouchEvidence> touches, const Hypothesis& of,
-                                     const ContactModel& contact, std::size_t object);
+                                     const ContactModel& contact);
 /// The scale by which the errors are likeliest, as normal ones: what of them falls as touches add
 /// up is the factor's, what remains the map's. None of fewer than 16 errors.
 std::optional<PoseScale> pose_scale_of(std::span<const PlaceError> errors);

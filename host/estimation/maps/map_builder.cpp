@@ -64,55 +64,48 @@ TileLists assign_to_tiles(std::span<const ElementReading> readings, const CellRa
         std::clamp(mm / cell_mm - static_cast<double>(origin), 0.0, static_cast<double>(cells - 1));
     return static_cast<std::int64_t>(cell) / shaders::TILE_CELLS;
   };
-  // Calls visit(list, place relative to the tile, reading) for every list of every reading: tile i
-  // has list 2 i for its near and list 2 i + 1 for its far readings.
-  const auto for_each_entry = [&](const auto& visit) {
-    for (const ElementReading& r : readings) {
-      const glm::dvec2& p = r.position_mm;
-      const std::int64_t last_row = tile_of(p.y + radius_mm, range.y, range.ny);
-      const std::int64_t last_column = tile_of(p.x + radius_mm, range.x, range.nx);
-      for (auto row = tile_of(p.y - radius_mm, range.y, range.ny); row <= last_row; ++row) {
-        for (auto column = tile_of(p.x - radius_mm, range.x, range.nx); column <= last_column;
-             ++column) {
-          const glm::dvec2 corner =
-              cell_mm * glm::dvec2(static_cast<double>(range.x + column * shaders::TILE_CELLS),
-                                   static_cast<double>(range.y + row * shaders::TILE_CELLS));
-          const glm::dvec2 local = p - corner;
-          const double outside_x = std::max({0.0, -local.x, local.x - tile_mm});
-          const double outside_y = std::max({0.0, -local.y, local.y - tile_mm});
-          const double distance = std::hypot(outside_x, outside_y);
-          if (distance <= radius_mm) {
-            const auto tile = static_cast<std::size_t>(row * columns + column);
-            visit(2 * tile + (distance <= near_mm ? 0 : 1), local, r.reading);
-          }
+  struct OfTile {
+    std::vector<shaders::TileReading> near;
+    std::vector<shaders::TileReading> far;
+  };
+  std::vector<OfTile> of_tiles(static_cast<std::size_t>(columns * rows));
+  for (const auto& [p, reading] : readings) {
+    const std::int64_t last_row = tile_of(p.y + radius_mm, range.y, range.ny);
+    const std::int64_t last_column = tile_of(p.x + radius_mm, range.x, range.nx);
+    for (auto row = tile_of(p.y - radius_mm, range.y, range.ny); row <= last_row; ++row) {
+      for (auto column = tile_of(p.x - radius_mm, range.x, range.nx); column <= last_column;
+           ++column) {
+        const glm::dvec2 corner =
+            cell_mm * glm::dvec2(static_cast<double>(range.x + column * shaders::TILE_CELLS),
+                                 static_cast<double>(range.y + row * shaders::TILE_CELLS));
+        const glm::dvec2 local = p - corner;
+        const double outside_x = std::max({0.0, -local.x, local.x - tile_mm});
+        const double outside_y = std::max({0.0, -local.y, local.y - tile_mm});
+        const double distance = std::hypot(outside_x, outside_y);
+        if (distance <= radius_mm) {
+          OfTile& tile = of_tiles[static_cast<std::size_t>(row * columns + column)];
+          (distance <= near_mm ? tile.near : tile.far)
+              .push_back(tile_reading(local, reading, sensor.prior));
         }
       }
     }
-  };
-
-  // Counting sort: the sizes of all lists, then their places, then their contents.
-  std::vector<std::uint32_t> next(2 * static_cast<std::size_t>(columns * rows) + 1, 0);
-  for_each_entry([&](std::size_t list, const glm::dvec2&, Reading) { ++next[list + 1]; });
-  TileLists lists;
-  for (std::size_t list = 0; list + 1 < next.size(); list += 2) {
-    const std::uint32_t near = next[list + 1];
-    const std::uint32_t count = near + next[list + 2];
-    if (count > 0) {
-      const auto tile = static_cast<std::int64_t>(list / 2);
-      lists.tiles.push_back(
-          {.column = static_cast<shaders::uint>(tile % columns * shaders::TILE_CELLS),
-           .row = static_cast<shaders::uint>(tile / columns * shaders::TILE_CELLS),
-           .first = next[list],
-           .near = near,
-           .count = count});
-    }
-    next[list + 1] += next[list];
-    next[list + 2] += next[list + 1];
   }
-  lists.readings.resize(next.back());
-  for_each_entry([&](std::size_t list, const glm::dvec2& local, Reading reading) {
-    lists.readings[next[list]++] = tile_reading(local, reading, sensor.prior);
-  });
+  TileLists lists;
+  for (std::size_t i = 0; i < of_tiles.size(); ++i) {
+    const auto& [near, far] = of_tiles[i];
+    if (near.empty() && far.empty()) {
+      continue;
+    }
+    const auto tile = static_cast<std::int64_t>(i);
+    lists.tiles.push_back(
+        {.column = static_cast<shaders::uint>(tile % columns * shaders::TILE_CELLS),
+         .row = static_cast<shaders::uint>(tile / columns * shaders::TILE_CELLS),
+         .first = static_cast<shaders::uint>(lists.readings.size()),
+         .near = static_cast<shaders::uint>(near.size()),
+         .count = static_cast<shaders::uint>(near.size() + far.size())});
+    lists.readings.insert(lists.readings.end(), near.begin(), near.end());
+    lists.readings.insert(lists.readings.end(), far.begin(), far.end());
+  }
   return lists;
 }
 
@@ -135,146 +128,6 @@ gpu::Kernel evidence_kernel(gpu::Context& context, const InverseSensorModel& sen
                          bits(1.0 / (2.0 * sensor.spread_mm * sensor.spread_mm))}}};
 }
 
-/// Sums the log-odds increments of readings per cell on the device (Eq. 4-6), in two floats, so
-/// that each sum is exact to float32 for any number of readings. The grid grows with the readings.
-class EvidenceGrid {
- public:
-  EvidenceGrid(gpu::Context& context, double cell_mm, const InverseSensorModel& sensor)
-      : context_(context),
-        stream_(context),
-        cell_mm_(cell_mm),
-        sensor_(sensor),
-        kernel_(evidence_kernel(context, sensor)) {}
-
-  /// Throws Error where the device cannot hold these cells.
-  void require_room(const CellRange& range) const;
-  /// Adds each reading to the cells within `radius_mm` of it and to some beyond, in passes of
-  /// bounded device memory.
-  void add(std::span<const ElementReading> readings, double radius_mm);
-  /// Returns the sums over the cells of a range, in row-major order; 0 where nothing was added.
-  std::vector<double> sums(const CellRange& range);
-  /// Removes all evidence and all cells.
-  void clear() {
-    cells_ = {};
-    needed_ = {};
-    range_ = {};
-  }
-
- private:
-  bool has_room(const CellRange& range) const;
-  void grow(const CellRange& needed);
-
-  gpu::Context& context_;
-  gpu::CommandStream stream_;
-  double cell_mm_;
-  InverseSensorModel sensor_;
-  gpu::Kernel kernel_;
-  CellRange needed_;   ///< cells that the readings so far need
-  CellRange range_;    ///< needed_ and room to grow
-  gpu::Buffer cells_;  ///< of range_, [ny, nx], two floats
-};
-
-bool EvidenceGrid::has_room(const CellRange& range) const {
-  const gpu::Limits& limits = context_.limits();
-  return bytes_of(range) <= std::min({limits.storage_range, limits.allocation, limits.memory});
-}
-
-void EvidenceGrid::require_room(const CellRange& range) const {
-  if (!has_room(range)) {
-    throw Error(
-        Fault::input,
-        fmt::format("the map would have {} x {} cells of {} mm, more than device '{}' binds "
-                    "at once; use larger cells, or touches that lie closer together",
-                    range.nx, range.ny, cell_mm_, context_.name()));
-  }
-}
-
-void EvidenceGrid::grow(const CellRange& needed) {
-  needed_ = united(needed_, needed);
-  if (range_.contains(needed_)) {
-    return;
-  }
-  CellRange larger = needed_;
-  if (range_.nx > 0) {
-    // Spare cells around, for what a moving sensor touches next, keep growing rare.
-    const CellRange roomy{larger.x - larger.nx / 4, larger.y - larger.ny / 4,
-                          larger.nx + larger.nx / 2, larger.ny + larger.ny / 2};
-    if (has_room(roomy)) {
-      larger = roomy;
-    }
-  }
-  require_room(larger);
-  gpu::Buffer cells(context_, bytes_of(larger), gpu::Memory::device, "map cells");
-  std::vector<TwoFloat> old(static_cast<std::size_t>(range_.nx * range_.ny));
-  if (!old.empty()) {
-    stream_.download(cells_, old);
-    stream_.run();
-  }
-  stream_.fill(cells, 0);
-  // Spare cells outside the new range hold only increments beyond the radius and are dropped.
-  const CellRange kept = common(range_, larger);
-  for (std::int64_t y = kept.y; y < kept.y + kept.ny; ++y) {
-    stream_.upload(
-        cells, std::span(old).subspan(range_.index(kept.x, y), static_cast<std::size_t>(kept.nx)),
-        larger.index(kept.x, y) * sizeof(TwoFloat));
-  }
-  stream_.run();
-  cells_ = std::move(cells);
-  range_ = larger;
-}
-
-void EvidenceGrid::add(std::span<const ElementReading> readings, double radius_mm) {
-  const double tiles_across = 2.0 + 2.0 * radius_mm / (cell_mm_ * shaders::TILE_CELLS);
-  const double most_entries = std::min(static_cast<double>(entries_per_pass),
-                                       static_cast<double>(context_.limits().table_texels));
-  // All readings of a pass may lie on one tile.
-  const auto pass =
-      static_cast<std::size_t>(std::clamp(most_entries / (tiles_across * tiles_across), 1.0,
-                                          static_cast<double>(gpu::most_iterations)));
-  for (; !readings.empty(); readings = readings.subspan(std::min(pass, readings.size()))) {
-    const auto part = readings.first(std::min(pass, readings.size()));
-    BoundingBox box;
-    for (const ElementReading& r : part) {
-      box.take_in(r.position_mm);
-    }
-    grow(cover(box.lower, box.upper, radius_mm, cell_mm_));
-
-    const TileLists lists = assign_to_tiles(part, range_, cell_mm_, radius_mm, sensor_);
-    if (lists.tiles.empty()) {
-      continue;  // every reading falls between the centres of cells larger than its support
-    }
-    const gpu::Buffer tiles = stream_.uploaded(lists.tiles, "map tiles");
-    const gpu::Buffer list =
-        stream_.uploaded(lists.readings, "readings per map tile", VK_FORMAT_R32G32B32A32_SFLOAT);
-    const std::size_t limit = context_.limits().group_count[0];
-    for (std::size_t tile = 0; tile < lists.tiles.size(); tile += limit) {
-      const shaders::EvidencePush push{.tile_first = static_cast<shaders::uint>(tile),
-                                       .width = static_cast<shaders::uint>(range_.nx),
-                                       .height = static_cast<shaders::uint>(range_.ny),
-                                       .cell_mm = static_cast<float>(cell_mm_)};
-      const auto groups = static_cast<std::uint32_t>(std::min(limit, lists.tiles.size() - tile));
-      stream_.dispatch(kernel_, {&tiles, &list, &cells_}, push, {groups, 1, 1});
-    }
-    stream_.run();
-  }
-}
-
-std::vector<double> EvidenceGrid::sums(const CellRange& range) {
-  std::vector<TwoFloat> cells(static_cast<std::size_t>(range_.nx * range_.ny));
-  if (!cells.empty()) {
-    stream_.download(cells_, cells);
-    stream_.run();
-  }
-  std::vector<double> sums(static_cast<std::size_t>(range.nx * range.ny), 0.0);
-  const CellRange summed = common(range, range_);
-  for (std::int64_t y = summed.y; y < summed.y + summed.ny; ++y) {
-    for (std::int64_t x = summed.x; x < summed.x + summed.nx; ++x) {
-      sums[range.index(x, y)] = cells[range_.index(x, y)].value();
-    }
-  }
-  return sums;
-}
-
 // Most readings that wait on the host: bounds the memory that a long recording takes.
 constexpr std::size_t pending_readings = 1 << 18;
 
@@ -291,40 +144,141 @@ struct Seen {
 
 }  // namespace
 
+/// Sums the log-odds increments of readings per cell on the device (Eq. 4-6), in two floats, so
+/// that each sum is exact to float32 for any number of readings. The grid grows with the readings.
 struct MapBuilder::Impl {
   Impl(Device& device, const MapOptions& wanted)
-      : options(wanted), grid(device.context(), wanted.cell_mm, wanted.sensor) {}
+      : options(wanted),
+        context(device.context()),
+        stream(context),
+        kernel(evidence_kernel(context, wanted.sensor)) {}
 
   double radius_mm(const Seen& all) const {
     return support_radius_mm(options.sensor, all.readings);
   }
-
+  /// Throws Error where the device cannot hold these cells.
+  void require_room(const CellRange& cells) const;
   /// Returns the cells of a map of all these readings. Throws Error where they are too many.
-  CellRange range_of(const Seen& all) const {
-    const CellRange range = cover(all.box.lower, all.box.upper, radius_mm(all), options.cell_mm);
-    grid.require_room(range);
-    return range;
-  }
-
-  void flush() {
-    grid.add(pending, radius_mm(seen));
-    pending.clear();
-  }
+  CellRange range_of(const Seen& all) const;
+  void grow(const CellRange& needed);
+  /// Adds each pending reading to the cells within radius_mm() of it and to some beyond, in passes
+  /// of bounded device memory.
+  void flush();
+  /// Returns the sums over these cells, in row-major order; 0 where nothing was added.
+  std::vector<double> sums(const CellRange& of);
 
   MapOptions options;
-  EvidenceGrid grid;
+  gpu::Context& context;
+  gpu::CommandStream stream;
+  gpu::Kernel kernel;
+  CellRange range;                      ///< that the readings on the device need
+  gpu::Buffer cells;                    ///< of `range`, [ny, nx], two floats
   std::vector<ElementReading> pending;  ///< robot frame = object frame
   Seen seen;                            ///< all readings so far, pending ones too
   ChangeInSteps change{"map: adding touches failed half-way; clear() the builder"};
   OwnProcess process;
 };
 
-MapBuilder::MapBuilder(Device& device, const MapOptions& options) {
-  options.validate();
-  impl_.reset(new Impl(device, options));
+void MapBuilder::Impl::require_room(const CellRange& cells) const {
+  const gpu::Limits& limits = context.limits();
+  if (bytes_of(cells) > std::min({limits.storage_range, limits.allocation, limits.memory})) {
+    throw Error(
+        Fault::input,
+        fmt::format("the map would have {} x {} cells of {} mm, more than device '{}' binds "
+                    "at once; use larger cells, or touches that lie closer together",
+                    cells.nx, cells.ny, options.cell_mm, context.name()));
+  }
 }
 
-void MapBuilder::Deleter::operator()(Impl* impl) const { delete_here(impl); }
+CellRange MapBuilder::Impl::range_of(const Seen& all) const {
+  const CellRange needed = cover(all.box.lower, all.box.upper, radius_mm(all), options.cell_mm);
+  require_room(needed);
+  return needed;
+}
+
+void MapBuilder::Impl::grow(const CellRange& needed) {
+  if (range.contains(needed)) {
+    return;
+  }
+  const CellRange larger = united(range, needed);
+  require_room(larger);
+  gpu::Buffer grown(context, bytes_of(larger), gpu::Memory::device, "map cells");
+  std::vector<TwoFloat> old(static_cast<std::size_t>(range.nx * range.ny));
+  if (!old.empty()) {
+    stream.download(cells, old);
+    stream.run();
+  }
+  stream.fill(grown, 0);
+  const auto width = static_cast<std::size_t>(range.nx);
+  for (std::int64_t y = range.y; y < range.y + range.ny; ++y) {
+    stream.upload(grown, std::span(old).subspan(range.index(range.x, y), width),
+                  larger.index(range.x, y) * sizeof(TwoFloat));
+  }
+  stream.run();
+  cells = std::move(grown);
+  range = larger;
+}
+
+void MapBuilder::Impl::flush() {
+  const double radius = radius_mm(seen);
+  const double cell_mm = options.cell_mm;
+  const double tiles_across = 2.0 + 2.0 * radius / (cell_mm * shaders::TILE_CELLS);
+  const double most_entries = std::min(static_cast<double>(entries_per_pass),
+                                       static_cast<double>(context.limits().table_texels));
+  // All readings of a pass may lie on one tile.
+  const auto pass =
+      static_cast<std::size_t>(std::clamp(most_entries / (tiles_across * tiles_across), 1.0,
+                                          static_cast<double>(gpu::most_iterations)));
+  for (std::span<const ElementReading> readings = pending; !readings.empty();
+       readings = readings.subspan(std::min(pass, readings.size()))) {
+    const auto part = readings.first(std::min(pass, readings.size()));
+    BoundingBox box;
+    for (const ElementReading& r : part) {
+      box.take_in(r.position_mm);
+    }
+    grow(cover(box.lower, box.upper, radius, cell_mm));
+
+    const TileLists lists = assign_to_tiles(part, range, cell_mm, radius, options.sensor);
+    if (lists.tiles.empty()) {
+      continue;  // every reading falls between the centres of cells larger than its support
+    }
+    const gpu::Buffer tiles = stream.uploaded(lists.tiles, "map tiles");
+    const gpu::Buffer list =
+        stream.uploaded(lists.readings, "readings per map tile", VK_FORMAT_R32G32B32A32_SFLOAT);
+    const std::size_t limit = context.limits().group_count[0];
+    for (std::size_t tile = 0; tile < lists.tiles.size(); tile += limit) {
+      const shaders::EvidencePush push{.tile_first = static_cast<shaders::uint>(tile),
+                                       .width = static_cast<shaders::uint>(range.nx),
+                                       .height = static_cast<shaders::uint>(range.ny),
+                                       .cell_mm = static_cast<float>(cell_mm)};
+      const auto groups = static_cast<std::uint32_t>(std::min(limit, lists.tiles.size() - tile));
+      stream.dispatch(kernel, {&tiles, &list, &cells}, push, {groups, 1, 1});
+    }
+    stream.run();
+  }
+  pending.clear();
+}
+
+std::vector<double> MapBuilder::Impl::sums(const CellRange& of) {
+  std::vector<TwoFloat> read(static_cast<std::size_t>(range.nx * range.ny));
+  if (!read.empty()) {
+    stream.download(cells, read);
+    stream.run();
+  }
+  std::vector<double> sums(static_cast<std::size_t>(of.nx * of.ny), 0.0);
+  const CellRange summed = common(of, range);
+  for (std::int64_t y = summed.y; y < summed.y + summed.ny; ++y) {
+    for (std::int64_t x = summed.x; x < summed.x + summed.nx; ++x) {
+      sums[of.index(x, y)] = read[range.index(x, y)].value();
+    }
+  }
+  return sums;
+}
+
+MapBuilder::MapBuilder(Device& device, const MapOptions& options) {
+  options.validate();
+  impl_ = {new Impl(device, options), delete_here<Impl>};
+}
 
 MapBuilder::Impl& MapBuilder::impl() const { return held_here(impl_, "map builder"); }
 
@@ -372,7 +326,7 @@ OccupancyGrid MapBuilder::build(const std::string& label) {
   const CellRange range = all.range_of(all.seen);
   OccupancyGrid map = map_frame(options, label, range);
   const double prior = map.prior_log_odds();
-  for (const double sum : all.grid.sums(range)) {
+  for (const double sum : all.sums(range)) {
     map.log_odds.push_back(static_cast<float>(prior + sum));
   }
   if (const auto fault = fault_of(map)) {
@@ -385,7 +339,8 @@ void MapBuilder::clear() {
   Impl& map = impl();
   map.pending.clear();
   map.seen = {};
-  map.grid.clear();
+  map.range = {};
+  map.cells = {};
   map.change.forget();
 }
 

@@ -64,10 +64,10 @@ OccupancyGrid built(Device& device, const OccupancyGrid& map, double prior) {
 }  // namespace
 
 OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior) {
-  if (map.drawn) {
-    return built(device, map, prior);
-  }
   const OccupancyGrid other = built(device, map, prior);
+  if (map.drawn) {
+    return other;
+  }
   if (other.nx != map.nx || other.ny != map.ny) {
     throw Error(
         Fault::input,

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,6 +10,7 @@
 #include "estimation/change_in_steps.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/kernel_sizes.hpp"
+#include "estimation/log_sum.hpp"
 #include "estimation/particles/particle_draws.hpp"
 #include "estimation/particles/particle_likelihood.hpp"
 #include "estimation/particles/parzen_mode.hpp"
@@ -99,9 +100,7 @@ struct ParticleFilter::Impl {
         gpu::Buffer(context, std::span(sums).size_bytes(), gpu::Memory::device, "sums of weights");
     draw_blocks = gpu::Buffer(context, sums.size() * sizeof(shaders::DrawBlock),
                               gpu::Memory::device, "sums of weights", VK_FORMAT_R32G32B32A32_SINT);
-    const std::vector<shaders::ObjectShare> all_shares = object_shares(hypotheses, options);
-    share_count = static_cast<shaders::uint>(all_shares.size());
-    shares = stream.uploaded(all_shares, "prior weights");
+    shares = stream.uploaded(object_shares(hypotheses, options), "prior weights");
     start();
   }
 
@@ -146,7 +145,7 @@ struct ParticleFilter::Impl {
         .particles = static_cast<shaders::uint>(size()),
         .draw = method,
         .injected = in_words(injected),
-        .objects = share_count,
+        .objects = static_cast<shaders::uint>(objects),
         .blocks = static_cast<shaders::uint>(bounds.size()),
         .half_x_mm = static_cast<float>(half(options.region.x_mm)),
         .half_y_mm = static_cast<float>(half(options.region.y_mm)),
@@ -169,7 +168,7 @@ struct ParticleFilter::Impl {
   }
 
   void update(const TouchEvidence& evidence) {
-    known = gathered({&evidence, 1}, options.region.pivot_mm, ParticleLikelihood::longest_run(),
+    known = gathered({&evidence, 1}, options.region.pivot_mm, ParticleLikelihood::longest_run,
                      std::move(known));
     ++touch;
     // A touch that says nothing moves the particles and leaves their weights: drawing anew would
@@ -222,21 +221,12 @@ struct ParticleFilter::Impl {
   /// Log of the summed weights of every object's particles, which may be far below what exp() can
   /// tell from 0; -infinity where an object has no particle.
   std::vector<double> log_sums(const Weighed& found) const {
-    constexpr double nothing = -std::numeric_limits<double>::infinity();
-    std::vector<double> largest(objects, nothing);
+    std::vector<LogSum> sums(objects);
     for (std::size_t i = 0; i < found.states.size(); ++i) {
-      double& of_object = largest[found.states[i].object];
-      of_object = std::max(of_object, found.log_weights[i]);
+      sums[found.states[i].object].add(found.log_weights[i]);
     }
-    std::vector<double> logs(objects);
-    for (std::size_t i = 0; i < found.states.size(); ++i) {
-      const shaders::uint object = found.states[i].object;
-      logs[object] += std::exp(found.log_weights[i] - largest[object]);
-    }
-    for (std::size_t object = 0; object < objects; ++object) {
-      logs[object] =
-          largest[object] == nothing ? nothing : largest[object] + std::log(logs[object]);
-    }
+    std::vector<double> logs;
+    std::ranges::transform(sums, std::back_inserter(logs), &LogSum::log);
     return logs;
   }
 
@@ -267,7 +257,6 @@ struct ParticleFilter::Impl {
   gpu::Buffer block_sums;
   gpu::Buffer draw_blocks;
   gpu::Buffer shares;
-  shaders::uint share_count = 0;
   std::vector<shaders::WeightBlock> sums;
   std::vector<shaders::DrawBlock> bounds;  ///< what goes to draw_blocks
   std::vector<TouchEvidence> classified;   ///< room for touches that are not classified
@@ -291,10 +280,8 @@ ParticleFilter::ParticleFilter(Device& device, std::span<const Hypothesis> hypot
   checked.contact = resolve(options.contact, hypotheses);
   validate(checked);
   require_room(checked, device.context());
-  impl_.reset(new Impl(device, hypotheses, checked));
+  impl_ = {new Impl(device, hypotheses, checked), delete_here<Impl>};
 }
-
-void ParticleFilter::Deleter::operator()(Impl* impl) const { delete_here(impl); }
 
 ParticleFilter::Impl& ParticleFilter::impl() const { return held_here(impl_, "particle filter"); }
 

@@ -17,10 +17,6 @@ namespace {
 
 using gpu::Access;
 
-// The table's least guaranteed size, less the headings, holds this many elements at 15 cell sizes.
-constexpr std::size_t most_elements = 4096;
-static_assert(most_elements <= gpu::most_iterations / 2);
-
 /// Coordinates in cells, or a cosine and sine, split at multiples of `quantum`. With 2^-2 cells and
 /// 2^-11, sums of products of the coarse parts are exact up to 1,000 cells.
 shaders::CoarseAndFine split_coarse(const glm::dvec2& v, double quantum) {
@@ -50,12 +46,10 @@ shaders::CoarseAndFine element_in_cells(const glm::dvec2& from_pivot_mm, double 
   return split_coarse(cells, 0.25);
 }
 
+/// Index in a list of different values, which takes in the value where it lacks it.
 std::size_t index_of(std::vector<double>& values, double value) {
-  const auto found = std::find(values.begin(), values.end(), value);
-  const auto index = static_cast<std::size_t>(found - values.begin());
-  if (found == values.end()) {
-    values.push_back(value);
-  }
+  const auto index = static_cast<std::size_t>(std::ranges::find(values, value) - values.begin());
+  values.resize(std::max(values.size(), index + 1), value);
   return index;
 }
 
@@ -76,13 +70,6 @@ BorderedMaps room_for(gpu::Context& context, std::span<const Hypothesis> hypothe
   return {context, *map_access(limits, cells), cells, "maps"};
 }
 
-std::vector<std::uint32_t> constants_of(const gpu::Limits& limits, const ContactModel& model,
-                                        const BorderedMaps& maps) {
-  std::vector<std::uint32_t> constants = contact_constants(limits, model);
-  constants.push_back(maps.nodes().is_table() ? 1U : 0U);
-  return constants;
-}
-
 }  // namespace
 
 ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream& stream,
@@ -92,14 +79,16 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
       stream_(stream),
       theta_centre_rad_(centre(region.theta_rad)),
       maps_(room_for(context, hypotheses)),
-      kernel_(context,
-              {.name = "weigh_particles",
-               .spirv = shaders::weigh_particles,
-               .bindings = {Access::table, Access::table, Access::table, Access::table,
-                            Access::storage, Access::storage, Access::storage, Access::storage},
-               .push_bytes = sizeof(shaders::WeighPush),
-               .constants = constants_of(context.limits(), model, maps_)}),
       contact_(context, stream, model) {
+  std::vector<std::uint32_t> constants = contact_constants(context.limits(), model);
+  constants.push_back(maps_.nodes().is_table() ? 1U : 0U);
+  kernel_ = gpu::Kernel(
+      context, {.name = "weigh_particles",
+                .spirv = shaders::weigh_particles,
+                .bindings = {Access::table, Access::table, Access::table, Access::table,
+                             Access::storage, Access::storage, Access::storage, Access::storage},
+                .push_bytes = sizeof(shaders::WeighPush),
+                .constants = constants});
   std::vector<shaders::ParticleMap> objects;
   for (std::size_t i = 0; i < hypotheses.size(); ++i) {
     const OccupancyGrid& map = hypotheses[i].compared();
@@ -122,8 +111,6 @@ ParticleLikelihood::ParticleLikelihood(gpu::Context& context, gpu::CommandStream
   reserve(64);
 }
 
-std::size_t ParticleLikelihood::longest_run() { return most_elements; }
-
 void ParticleLikelihood::reserve(std::size_t elements) {
   const std::size_t texels = shaders::HEADINGS + elements * cell_sizes_mm_.size();
   if (texels > context_.limits().table_texels) {
@@ -144,7 +131,7 @@ void ParticleLikelihood::reserve(std::size_t elements) {
 void ParticleLikelihood::weigh(const KnownElements& known, const gpu::Buffer& particles,
                                std::size_t count, const gpu::Buffer& log_weights) {
   // Room for all elements of the touch: of the next one more may be known.
-  const std::size_t room = std::min(known.from_pivot_mm.capacity(), most_elements);
+  const std::size_t room = std::min(known.from_pivot_mm.capacity(), longest_run);
   turned_mm_.clear();
   turned_mm_.reserve(known.from_pivot_mm.capacity());
   batch_.reserve(known.runs.capacity());

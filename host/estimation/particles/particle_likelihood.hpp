@@ -19,14 +19,16 @@ inline double centre(const Axis& axis) { return axis.lower + half(axis); }
 /// own. All maps stand in one buffer, so that one dispatch weighs all particles.
 class ParticleLikelihood {
  public:
+  /// Most elements that one run may hold. The table's least guaranteed size, less the headings,
+  /// holds this many elements at 15 cell sizes.
+  static constexpr std::size_t longest_run = 4096;
+  static_assert(longest_run <= gpu::most_iterations / 2);
+
   /// Records the upload of the maps.
   /// @throws Error where the maps together are more than one buffer of the device holds
   ParticleLikelihood(gpu::Context& context, gpu::CommandStream& stream,
                      std::span<const Hypothesis> hypotheses, const PoseLattice& region,
                      const ContactModel& model);
-
-  /// Most elements that one run may hold.
-  static std::size_t longest_run();
 
   /// Records the weighing of `count` particles, shaders::Particle about the region's centre, by one
   /// touch, all alike where it has no known element. Where it has very many, runs the stream in

@@ -6,9 +6,9 @@
 
 #include "palpate/api.hpp"
 #include "palpate/device.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
+#include "palpate/pose.hpp"
 
 namespace palpate {
 

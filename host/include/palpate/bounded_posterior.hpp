@@ -12,10 +12,9 @@
 
 #include "palpate/api.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/lattice.hpp"
-#include "palpate/plan.hpp"
+#include "palpate/pose.hpp"
 
 namespace palpate {
 
@@ -180,13 +179,10 @@ class PALPATE_API BoundedPosterior {
 
  private:
   struct PALPATE_LOCAL Impl;
-  struct PALPATE_API Deleter {
-    void operator()(Impl* impl) const;
-  };
   PALPATE_LOCAL Impl& impl() const;
   /// impl(), where no update has left the belief half-way. @throws Error where one has
   PALPATE_LOCAL Impl& with_touches_taken_in() const;
-  std::unique_ptr<Impl, Deleter> impl_;
+  std::unique_ptr<Impl, void (*)(Impl*)> impl_{nullptr, nullptr};
 };
 
 }  // namespace palpate

@@ -62,12 +62,8 @@ class PALPATE_API Device {
   PALPATE_LOCAL gpu::Context& context();  ///< for the library's own classes
 
  private:
-  struct PALPATE_API Deleter {
-    void operator()(gpu::Context* context) const;
-  };
-
   PALPATE_LOCAL explicit Device(gpu::Context* context);
-  std::unique_ptr<gpu::Context, Deleter> context_;
+  std::unique_ptr<gpu::Context, void (*)(gpu::Context*)> context_{nullptr, nullptr};
 };
 
 }  // namespace palpate

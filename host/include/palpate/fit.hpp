@@ -6,7 +6,6 @@
 
 #include "palpate/api.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 #include "palpate/touch.hpp"
@@ -97,6 +96,15 @@ PALPATE_API FitScale pooled(std::span<const FitScale> objects);
 /// of L(r) under q, and sums over the known elements of all touches,
 ///   z = sum (L(reading) - M) / sqrt(sum V).
 /// Elements count as independent; Unknown elements do not count.
+///
+/// By `touch_sd` each touch may have been displaced by itself: the sensor really was at
+/// T_robot_sensor * delta, delta normally distributed. L is then a touch's log-likelihood
+/// averaged over delta, log E P(readings), and M and V are its mean and variance over touches of
+/// the object: delta drawn first, then each element's reading from q at that place. With sums over
+/// the touches,
+///   z = sum (L - M) / sqrt(sum V).
+/// E is a mean over 128 displacements, M and V are estimated from 64 drawn touches each, which
+/// leaves z uncertain by about 0.1; the seed is fixed.
 /// @param T_object_robot pose of the robot frame in the object frame
 /// @param contact its prior is the map's where it has none
 /// @param object index of the object whose numbers of a table are used
@@ -104,20 +112,6 @@ PALPATE_API FitScale pooled(std::span<const FitScale> objects);
 /// @throws Error on a touch that is not sound, or a table without numbers for the object
 PALPATE_API std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
                                       const OccupancyGrid& map, const ContactModel& contact,
-                                      std::size_t object = 0);
-
-/// The fit of touches each of which may have been displaced by itself: where the sensor really was
-/// at T_robot_sensor * delta, delta normally distributed. L is then a touch's log-likelihood
-/// averaged over delta, log E P(readings), and M and V are its mean and variance over touches of
-/// the object: delta drawn first, then each element's reading from q at that place. With sums over
-/// the touches,
-///   z = sum (L - M) / sqrt(sum V).
-/// E is a mean over 128 displacements, M and V are estimated from 64 drawn touches each, which
-/// leaves z uncertain by about 0.1; the seed is fixed. Without a displacement the fit is that of
-/// the function above.
-/// @throws Error as the function above
-PALPATE_API std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
-                                      const OccupancyGrid& map, const ContactModel& contact,
-                                      const DisplacementSd& touch_sd, std::size_t object = 0);
+                                      const DisplacementSd& touch_sd = {}, std::size_t object = 0);
 
 }  // namespace palpate

@@ -101,13 +101,10 @@ class PALPATE_API ParticleFilter {
 
  private:
   struct PALPATE_LOCAL Impl;
-  struct PALPATE_API Deleter {
-    void operator()(Impl* impl) const;
-  };
   PALPATE_LOCAL Impl& impl() const;
   /// Like impl(), but throws Error where a failed update left the particles half-way.
   PALPATE_LOCAL Impl& unbroken() const;
-  std::unique_ptr<Impl, Deleter> impl_;
+  std::unique_ptr<Impl, void (*)(Impl*)> impl_{nullptr, nullptr};
 };
 
 }  // namespace palpate

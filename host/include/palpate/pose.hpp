@@ -34,4 +34,14 @@ PALPATE_API glm::dvec2 rotate(double theta_rad, const glm::dvec2& v);
 /// Returns the angle plus a whole number of periods, in [-period/2, period/2).
 PALPATE_API double wrap_angle(double theta_rad, double period_rad = 2.0 * std::numbers::pi);
 
+/// Standard deviations of a small displacement in the plane: of x and of y, in mm, and of the
+/// angle, in radians. All three are independent and normally distributed about 0.
+struct DisplacementSd {
+  double mm = 0.0;
+  double rad = 0.0;
+
+  /// True where nothing is ever displaced.
+  bool none() const { return mm == 0.0 && rad == 0.0; }
+};
+
 }  // namespace palpate

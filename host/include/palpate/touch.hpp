@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -11,9 +12,24 @@
 
 #include "palpate/api.hpp"
 #include "palpate/pose.hpp"
-#include "palpate/setup_finding.hpp"
 
 namespace palpate {
+
+/// Something that is wrong with the set-up of a robot and its array.
+struct SetupFinding {
+  /// "pose_unit", "element_order", "array_offset", "pitch", "dead_elements", "stuck_elements",
+  /// "contradicting", "unexplained", as touches say; "tilt", "clock" or "dropped", as logs do.
+  std::string what;
+  /// By how much more likely the touches are once it is mended; of "clock", log 19 for each press
+  /// that it explains; 0 of "unexplained", "tilt" and "dropped", which are counted.
+  double nats = 0.0;
+  std::string words;                      ///< a sentence, options between `quotes`
+  std::vector<std::string> options = {};  ///< that mend it together, such as "dead 13,42"
+  /// Pose of the recordings' array in the true sensor frame, to be applied to the elements, with
+  /// its standard deviations in mm, mm and rad.
+  std::optional<Pose> array_offset = {};
+  std::optional<std::array<double, 3>> sd = {};
+};
 
 /// Returns the element centres, [36] in mm in the sensor frame, of the central 6 x 6 region of two
 /// PPS DigiTacts pads side by side: x = +-1.1, +-3.0, +-4.9, y = (k - 2.5) * 1.9; x varies fastest.

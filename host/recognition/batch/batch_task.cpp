@@ -13,7 +13,6 @@
 #include "io/atomic_file.hpp"
 #include "io/input_file.hpp"
 #include "options/option.hpp"
-#include "options/refused_option.hpp"
 
 namespace palpate {
 

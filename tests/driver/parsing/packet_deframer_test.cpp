@@ -104,31 +104,71 @@ INSTANTIATE_TEST_SUITE_P(All, ShippedBoard,
                          testing::Values("tsf85", "wts", "flexitac", "flexitac12", "anyskin"),
                          [](const auto& board) { return std::string(board.param); });
 
-// The example that PacketDeframer is explained by.
-TEST(PacketDeframer, FindsItsPlaceAgainBehindLostAndWrongBytes) {
-  Receiver receiver(
-      parse_serial_profile("name: two elements\nelements: [[0, 0], [2, 0]]\n"
-                           "packet: [{bytes: aa 55}, {values: u8}, {checksum: sum8, from: 2}]\n",
-                           "example.yaml"));
-  receiver.push(
-      Bytes{0x31, 0xaa, 0x55, 7, 9, 0x10, 0xaa, 0x55, 0xaa, 0x55, 3, 4, 7, 0xaa, 0x55, 5, 6, 0xff});
-  ASSERT_EQ(receiver.frames().size(), 2u);
-  EXPECT_EQ(receiver.frames()[0].values, (std::vector<double>{7, 9}));
-  EXPECT_EQ(receiver.frames()[1].values, (std::vector<double>{3, 4}));
-  EXPECT_EQ(receiver.checksum_errors(), 2u);
-  EXPECT_EQ(receiver.garbage(), 1u + 2u + 5u);
-}
+struct StreamCase {
+  const char* name;
+  const char* profile;
+  Bytes bytes;
+  std::vector<std::vector<double>> frames;
+  std::uint64_t checksum_errors = 0;
+  std::uint64_t garbage = 0;
+};
 
-TEST(PacketDeframer, FindsTheFieldsBehindCountedParts) {
-  Receiver receiver(parse_serial_profile(
-      "name: parts\nelements: [[0, 0], [2, 0]]\n"
-      "packet: [{bytes: aa}, {length: u8, most: 16}, {parts: u8, tags: [{tag: 1, values: 2}]},\n"
-      "         {time: u8}, {checksum: sum8}]\n",
-      "parts.yaml"));
-  receiver.push(Bytes{0xaa, 4, 1, 7, 9, 5, 0xc4});
-  ASSERT_EQ(receiver.frames().size(), 1u);
-  EXPECT_EQ(receiver.frames()[0].values, (std::vector<double>{7, 9}));
-  EXPECT_NEAR(receiver.frames()[0].device_time_s.value(), 0.005, 1e-12);
+// Boards of which each has a packet of another layout.
+const StreamCase streams[] = {
+    {.name = "the example that PacketDeframer is explained by",
+     .profile = "name: two elements\nelements: [[0, 0], [2, 0]]\n"
+                "packet: [{bytes: aa 55}, {values: u8}, {checksum: sum8, from: 2}]\n",
+     .bytes = {0x31, 0xaa, 0x55, 7, 9, 0x10, 0xaa, 0x55, 0xaa, 0x55, 3, 4, 7, 0xaa, 0x55, 5, 6,
+               0xff},
+     .frames = {{7, 9}, {3, 4}},
+     .checksum_errors = 2,
+     .garbage = 1 + 2 + 5},
+    {.name = "fields behind counted parts",
+     .profile =
+         "name: parts\nelements: [[0, 0], [2, 0]]\n"
+         "packet: [{bytes: aa}, {length: u8, most: 16},\n"
+         "         {parts: u8, tags: [{tag: 1, values: 2}]}, {time: u8}, {checksum: sum8}]\n",
+     .bytes = {0xaa, 4, 1, 7, 9, 5, 0xc4},
+     .frames = {{7, 9, 0.005}}},
+    {.name = "a row in a packet, big-endian and signed, with a checksum in front",
+     .profile = "name: rows\ngain: 0.25\noffset: -10\n"
+                "elements: [{grid: [3, 2], pitch_mm: [2, 2]}]\n"
+                "packet: [{bytes: f0 0f},\n"
+                "         {checksum: crc16, polynomial: 0x1021, init: 0xffff, order: be,\n"
+                "          covers: after},\n"
+                "         {parts: s16be, tags: [{tag: 1, values: 3}, {tag: 2, values: 3}]}]\n",
+     .bytes = {0xf0, 0x0f, 0x06, 0xa1, 1, 0x00, 0x04, 0xff, 0xfc, 0x80, 0x00,  // 4, -4, -32768
+               0xf0, 0x0f, 0xee, 0x77, 2, 0x7f, 0xff, 0x00, 0x00, 0x00, 0x28,  // 32767, 0, 40
+               0xf0, 0x0f, 0,    0,    1, 0,    0,    0,    0,    0,    0},
+     .frames = {{-9, -11, -8202, 8181.75, -10, 0}},
+     .checksum_errors = 1,
+     .garbage = 11},
+    {.name = "a length that counts the whole packet, with checksum and terminator",
+     .profile = "name: counted\nelements: [[0, 0], [1, 0]]\n"
+                "packet: [{bytes: \"02\"}, {length: u16be, extra: 6}, {values: u32be},\n"
+                "         {checksum: xor8, from: 1}, {bytes: \"0303\"}]\n",
+     .bytes = {0x02, 0, 14, 0, 0, 0, 1, 0xff, 0xff, 0xff, 0xff, 14 ^ 1, 0x03, 0x03,  //
+               0x02, 0, 14, 0, 0, 0, 1, 0xff, 0xff, 0xff, 0xff, 14 ^ 1, 0x03, 0x04,  //
+               0x02, 0, 5},  // shorter than the fields around the values
+     .frames = {{1.0, 4294967295.0}},
+     .garbage = 14 + 3}};
+
+TEST(PacketDeframer, ReadsWhatTheProfileSaysAndCountsTheRest) {
+  for (const StreamCase& stream : streams) {
+    SCOPED_TRACE(stream.name);
+    Receiver receiver(parse_serial_profile(stream.profile, "own.yaml"));
+    receiver.push(stream.bytes);
+    std::vector<std::vector<double>> frames;  // and the time of those that tell it
+    for (const Frame& frame : receiver.frames()) {
+      frames.push_back(frame.values);
+      if (frame.device_time_s) {
+        frames.back().push_back(*frame.device_time_s);
+      }
+    }
+    EXPECT_EQ(frames, stream.frames);
+    EXPECT_EQ(receiver.checksum_errors(), stream.checksum_errors);
+    EXPECT_EQ(receiver.garbage(), stream.garbage);
+  }
 }
 
 TEST(EndlessGarbage, NeedsNoMoreMemoryThanItsFirstBytes) {

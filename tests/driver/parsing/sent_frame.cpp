@@ -4,18 +4,12 @@
 #include <bit>
 #include <map>
 
+#include "driver/packet_format.hpp"
+
 namespace palpate {
 
-std::uint16_t weiss_checksum(const Bytes& bytes) {
-  unsigned crc = 0xffff;
-  for (const std::uint8_t byte : bytes) {
-    unsigned entry = ((crc ^ byte) & 0xff) << 8;
-    for (int bit = 0; bit < 8; ++bit) {
-      entry = (entry & 0x8000) != 0 ? entry << 1 ^ 0x1021 : entry << 1;
-    }
-    crc = (entry & 0xffff) ^ crc >> 8;
-  }
-  return static_cast<std::uint16_t>(crc);
+std::uint32_t weiss_checksum(const Bytes& bytes) {
+  return Checksum{.kind = Checksum::Kind::weiss, .bytes = 2}.of(bytes);
 }
 
 namespace {
@@ -112,7 +106,7 @@ Bytes wts_packet(std::uint8_t id, const Bytes& payload) {
                   static_cast<std::uint8_t>(payload.size()),
                   static_cast<std::uint8_t>(payload.size() >> 8)};
   append(packet, payload);
-  const std::uint16_t crc = weiss_checksum(packet);
+  const std::uint32_t crc = weiss_checksum(packet);
   append(packet, {static_cast<std::uint8_t>(crc), static_cast<std::uint8_t>(crc >> 8)});
   return packet;
 }
@@ -134,10 +128,7 @@ void damage(Bytes& bytes, Damage kind, std::mt19937& random) {
         bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1u << random() % 8);
       }
       break;
-    case Damage::end_lost:
-      bytes.erase(from, bytes.end());
-      break;
-    case Damage::middle_lost:
+    case Damage::some_lost:
       bytes.erase(from, to);
       break;
     case Damage::others_between: {
@@ -148,10 +139,7 @@ void damage(Bytes& bytes, Damage kind, std::mt19937& random) {
     case Damage::some_twice: {
       const Bytes again(from, to);
       bytes.insert(to, again.begin(), again.end());
-      break;
     }
-    case Damage::all_random:
-      bytes = random_bytes(random() % 80, random);
   }
 }
 

@@ -21,16 +21,16 @@ SentFrame random_frame(const std::string& board, std::mt19937& random);
 std::vector<SentFrame> random_frames(const std::string& board, std::size_t count,
                                      std::mt19937& random);
 
-/// Weiss Robotics' checksum, bit by bit; 0 over a packet with its own checksum behind it.
-std::uint16_t weiss_checksum(const Bytes& bytes);
+/// Weiss Robotics' checksum; 0 over a packet with its own checksum behind it.
+std::uint32_t weiss_checksum(const Bytes& bytes);
 
 /// A WTS packet, whose checksum is computed so.
 Bytes wts_packet(std::uint8_t id, const Bytes& payload);
 
 Bytes random_bytes(std::size_t count, std::mt19937& random);
 
-enum class Damage { bits_flip, end_lost, middle_lost, others_between, some_twice, all_random };
-constexpr int kinds_of_damage = 6;
+enum class Damage { bits_flip, some_lost, others_between, some_twice };
+constexpr int kinds_of_damage = 4;
 
 /// Damages bytes as a line or a board may damage them.
 void damage(Bytes& bytes, Damage kind, std::mt19937& random);

@@ -16,8 +16,8 @@
 #include "estimation/hypotheses.hpp"
 #include "estimation/log_sum.hpp"
 #include "support/limits.hpp"
-#include "support/sanitized.hpp"
 #include "support/synthetic.hpp"
+#include "support/trials.hpp"
 
 namespace palpate::none_evidence_test {
 

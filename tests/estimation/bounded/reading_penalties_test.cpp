@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "bound_cases.hpp"
-#include "model/interpolated_map.hpp"
+#include "model/map_likelihood.hpp"
 #include "support/limits.hpp"
 #include "support/synthetic.hpp"
 

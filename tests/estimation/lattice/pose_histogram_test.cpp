@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "beliefs.hpp"
-#include "estimation/pose_draws.hpp"
+#include "model/random.hpp"
 
 namespace palpate::pose_histogram_test {
 
@@ -87,23 +87,6 @@ TEST_F(PoseHistogramTest, OnlyListedObjectsCostMemory) {
   // Beside its bins an object has its map, its axes and partial sums.
   EXPECT_LT(both - first, per_object + 20000);
   EXPECT_LT(first, 2 * per_object);
-}
-
-TEST_F(PoseHistogramTest, SlippingSaysNothingAboutTheObject) {
-  PoseHistogram slipping(device, three_objects(),
-                         {.lattice = small_lattice(), .slip_sd = {.mm = 1.0, .rad = 0.2}});
-  // A touch without a known element says nothing either; only the slip comes between.
-  const Recording recording = random_recording(1, 40, 73);
-  const Touch felt = recording.touch(0);
-  const std::vector<std::uint8_t> dead(felt.elements_mm.size(), 0);
-  Touch silent = felt;
-  silent.valid = dead;
-  for (PoseHistogram* histogram : {&slipping, &one}) {
-    histogram->update(felt);
-    histogram->update(silent);
-  }
-  EXPECT_LT(largest_difference(slipping.estimate().identity, one.estimate().identity), 1e-5);
-  EXPECT_GT(largest_difference(slipping.log_likelihood(0), one.log_likelihood(0)), 0.1);
 }
 
 TEST(PoseHistogram, DrawsLieWhereTheirPartsOfTheBeliefDo) {

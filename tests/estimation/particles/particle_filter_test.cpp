@@ -11,7 +11,6 @@
 
 #include "beliefs.hpp"
 #include "palpate/pose_error.hpp"
-#include "palpate/pose_histogram.hpp"
 #include "support/synthetic.hpp"
 #include "support/touched_shape.hpp"
 
@@ -148,18 +147,6 @@ TEST(ParticleFilter, TheSeedDecidesEveryBit) {
   EXPECT_EQ(told_by(first), told_by(second));
 }
 
-TEST(ParticleFilter, RunsWithAMillionParticles) {
-  Device device = Device::open();
-  const ParticleOptions options{.particles = 1'000'000, .region = {}};
-  ParticleFilter filter(device, three_objects(), options);
-  const Recording recording = random_recording(2, 12, 442);
-  filter.update(all_touches(recording));
-  EXPECT_GT(filter.effective_sample_size(), 1000.0);
-  EXPECT_LT(weight_error(filter, recording.touch(1), three_objects(), options, 1001), per_touch);
-  const Estimate estimate = filter.estimate();
-  EXPECT_NEAR(estimate.identity[0] + estimate.identity[1] + estimate.identity[2], 1.0, 1e-9);
-}
-
 TEST(ParticleFilter, MemoryCountsWhatAnEstimateTakes) {
   Device device = Device::open();
   constexpr int particles = 10'000;
@@ -172,52 +159,6 @@ TEST(ParticleFilter, MemoryCountsWhatAnEstimateTakes) {
 
 std::vector<Hypothesis> letter_and_disc() {
   return {{map_of(on_letter_l, "L"), 1.0}, {map_of(on_disc, "disc"), 1.0}};
-}
-
-TEST(ParticleFilter, AgreesWithTheHistogramWhereThereIsNoNoise) {
-  // After one touch and without motion, weighted uniform particles are an integral over the same
-  // belief that the histogram sums over fine bins.
-  const std::vector<Hypothesis> objects = letter_and_disc();
-  Recording recording = touches_of(on_letter_l, {{3.0, -2.0}, 1.0}, 5, 461);
-  // A quarter of the elements leaves the belief so broad that many particles count.
-  for (std::size_t k = 0; k < recording.elements(); ++k) {
-    recording.valid.push_back(k % 4 == 0 ? 1 : 0);
-  }
-  Device device = Device::open();
-  ParticleFilter filter(device, objects,
-                        {.particles = 100'000, .motion_mm = 0.0, .motion_rad = 0.0});
-  PoseHistogram histogram(
-      device, objects,
-      {.lattice = {
-           .x_mm = {-10.0, 10.0, 60}, .y_mm = {-10.0, 10.0, 60}, .theta_rad = {0.0, two_pi, 60}}});
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    filter.reset();
-    histogram.reset();
-    filter.update(recording.touch(i));
-    histogram.update(recording.touch(i));
-    // The variance of a share of the weights is at most that of a coin tossed as often as there are
-    // effective particles.
-    const double deviation = 0.5 / std::sqrt(filter.effective_sample_size());
-    EXPECT_NEAR(filter.estimate().identity[0], histogram.estimate().identity[0], 4.0 * deviation)
-        << "touch " << i;
-    EXPECT_LT(deviation, 0.02) << "or this compares nothing";
-  }
-}
-
-TEST(ParticleFilter, FindsTheObjectAndThePoseByEitherResampling) {
-  const std::vector<Hypothesis> objects = letter_and_disc();
-  const Pose truth{{-4.0, 2.5}, 4.0};
-  const Recording recording = touches_of(on_letter_l, truth, 8, 462);
-  Device device = Device::open();
-  for (const Resampling resampling : {Resampling::multinomial, Resampling::systematic}) {
-    ParticleFilter filter(device, objects, {.particles = 20'000, .resampling = resampling});
-    filter.update(all_touches(recording));
-    const Estimate estimate = filter.estimate();
-    EXPECT_GT(estimate.identity[0], 0.99);
-    EXPECT_EQ(estimate.mode.object, 0);
-    // The motion noise alone spreads particles over 1 mm and 0.1 rad, 0.6 mm at 6 mm.
-    EXPECT_LT(pose_error_mm(body_of(objects[0].map), 1, estimate.mode.T_object_robot, truth), 1.5);
-  }
 }
 
 TEST(ParticleFilter, RandomParticlesFindAnObjectThatWasTakenElsewhere) {

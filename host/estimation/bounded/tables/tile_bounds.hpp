@@ -9,9 +9,9 @@
 #include "estimation/bounded/tables/window_table.hpp"
 #include "estimation/known_elements.hpp"
 #include "palpate/contact_model.hpp"
-#include "palpate/displacement.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
+#include "palpate/pose.hpp"
 
 namespace palpate {
 
