@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
 """The version of CMakeLists.txt is that of the Python module, the node of ROS 2 and the newest release of
-CHANGELOG.md; the documents and examples ask for it, and pip builds it in a temporary folder."""
+CHANGELOG.md, and the documents and examples ask for it."""
 
 import pathlib
 import re
-import tomllib
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -33,10 +32,6 @@ class Versions(unittest.TestCase):
         asked = [(file.name, asked) for file in files for asked in found(file, r"find_package\(palpate ([\d.]+)")]
         self.assertGreater(len(asked), 3)
         self.assertEqual({version for _, version in asked}, {minor}, asked)
-
-    def test_pip_leaves_no_folder_in_a_checkout(self) -> None:
-        settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["scikit-build"]
-        self.assertNotIn("build-dir", settings)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@
 #include <glm/matrix.hpp>
 
 #include "estimation/lattice/refinement.hpp"
-#include "model/touch_evidence.hpp"
 #include "model/map_likelihood.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/lattice.hpp"

@@ -12,7 +12,6 @@
 #include "io/input_file.hpp"
 #include "model/printable.hpp"
 #include "options/option.hpp"
-#include "options/option.hpp"
 #include "palpate/error.hpp"
 #include "palpate/files.hpp"
 #include "palpate/map_builder.hpp"

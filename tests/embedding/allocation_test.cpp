@@ -106,16 +106,13 @@ TEST_F(Updates, OfSeveralTouchesAllocateNothingAfterTheFirst) {
   EXPECT_EQ(allocations_of([&] { filter.update(second); }), 0U);
 }
 
-TEST_F(Updates, OfAParticleFilterAllocateNothingAfterTheFirst) {
+TEST_F(Updates, OfParticlesAndOfASearchByBoundsAllocateNothingAfterTheFirst) {
   for (const Resampling resampling : {Resampling::multinomial, Resampling::systematic}) {
     for (const bool augmented : {false, true}) {
       expect_none_after_the_first(ParticleFilter(
           *device_, maps_, {.particles = 2000, .resampling = resampling, .augmented = augmented}));
     }
   }
-}
-
-TEST_F(Updates, OfASearchByBoundsAllocateNothingAfterTheFirst) {
   for (const std::optional<double> none_weight : {std::optional<double>(), std::optional(1.0)}) {
     expect_none_after_the_first(
         BoundedPosterior(maps_, {.lattice = small_lattice(), .none_weight = none_weight}));

@@ -13,11 +13,8 @@
 
 namespace palpate::canvas_test {
 
-TEST(Canvas, RefusesASizeBeyondCairo) {
+TEST(Canvas, FillsCellsFromTheLowestRowUpAndRefusesASizeBeyondCairo) {
   error_of(Fault::system, [] { Canvas(100000, 10); });
-}
-
-TEST(Canvas, FillsCellsFromTheLowestRowUp) {
   constexpr int nx = 4;
   constexpr int ny = 3;
   const auto colour = [](int i, int j) { return Colour{i / 3.0, j / 2.0, 0.2}; };

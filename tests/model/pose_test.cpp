@@ -128,12 +128,6 @@ OccupancyGrid letter_l() {
 
 constexpr double metric_rounding = 1e-10;  // of squares
 
-TEST(BodyOf, RefusesAMapWithoutOccupiedCells) {
-  OccupancyGrid map = letter_l();
-  map.log_odds.assign(6, 0.0F);
-  expect_named(input_error([&] { body_of(map); }), {"'L'"});
-}
-
 // The root mean squared displacement of the occupied cells, the least of all turns of the symmetry;
 // 0 for the truth itself.
 TEST(PoseError, IsTheReferences) {
@@ -163,10 +157,13 @@ TEST(NearestEqualPose, IsNoErrorAwayFromTheTruthAndAtMostHalfATurnOfTheSymmetryF
   }
 }
 
-TEST(PoseError, OfATruthThatIsAbsurdlyFarAwayIsFinite) {
+TEST(PoseError, OfATruthFarAwayIsFiniteAndOfAMapWithoutOccupiedCellsRefused) {
   // The square of 1e200 mm is infinite.
-  const double error_mm = pose_error_mm(body_of(letter_l()), 1, {}, {{1e200, 0.0}, 0.0});
+  OccupancyGrid map = letter_l();
+  const double error_mm = pose_error_mm(body_of(map), 1, {}, {{1e200, 0.0}, 0.0});
   EXPECT_NEAR(error_mm / 1e200, 1.0, 1e-12);
+  map.log_odds.assign(6, 0.0F);  // no cell is occupied
+  expect_named(input_error([&] { body_of(map); }), {"'L'"});
 }
 
 TEST(PoseLattice, PivotHasTheLatticesCoordinatesInTheObjectFrame) {

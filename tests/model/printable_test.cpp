@@ -7,13 +7,10 @@
 
 namespace palpate::printable_test {
 
-TEST(Printable, KeepsWellFormedText) {
+TEST(Printable, KeepsWellFormedTextAndReplacesControlCharacters) {
   for (const char* text : {"", "A.unknown.h5", "Schlüssel", "€", "−10 ≤ θ", "鍵", "🔑"}) {
     EXPECT_EQ(printable(text), text);
   }
-}
-
-TEST(Printable, ReplacesControlCharacters) {
   EXPECT_EQ(printable("a\nb\tc\x7F"), "a?b?c?");
   EXPECT_EQ(printable("\xC2\x85"), "??");  // next line, U+0085
   EXPECT_EQ(printable(std::string_view("a\0b", 3)), "a?b");

@@ -26,14 +26,10 @@ void expect_distributed(const std::function<double()>& draw, const std::vector<d
   }
 }
 
-TEST(Random, UniformIsOfTheHalfOpenUnitInterval) {
+TEST(Random, DrawsAreUniformInTheHalfOpenUnitIntervalAndStandardNormalWithTheirTails) {
   Random random(1, Stream::sensor);
   expect_distributed([&] { return random.uniform(); }, {0.0, 0.01, 0.2, 0.5, 0.8, 0.99, 1.0},
                      [](double z) { return z; });
-}
-
-TEST(Random, NormalIsOfAStandardGaussianWithItsTails) {
-  Random random(2, Stream::sensor);
   expect_distributed([&] { return random.normal(); }, {-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0},
                      [](double z) { return std::erfc(-z / std::sqrt(2.0)) / 2.0; });
 }
