@@ -69,7 +69,10 @@ class Hdf5Contents {
   template <typename Value>
   std::vector<Value> read(const std::string& dataset, std::uint64_t first_row = 0,
                           std::uint64_t rows = UINT64_MAX) const {
-    constexpr std::size_t width = std::is_arithmetic_v<Value> ? 1 : sizeof(Value) / sizeof(double);
+    std::size_t width = 1;
+    if constexpr (!std::is_arithmetic_v<Value>) {
+      width = sizeof(Value) / sizeof(double);
+    }
     std::vector<Value> all;
     all.reserve(size(dataset, first_row, rows) / width);
     const auto take = [&](std::uint64_t, std::span<const double> some) {

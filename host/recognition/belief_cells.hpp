@@ -24,9 +24,6 @@ LatticePlace place_of(const RefinedPose& refined, const PoseLattice& lattice);
 /// Variances of that place.
 LatticePlace variances_of(const RefinedPose& refined, const PoseLattice& lattice);
 
-/// Root mean square distance of the body from its centroid, mm: how far a turn by 1 rad moves it.
-double spin_mm(const Body& body);
-
 /// The peaks of an object's belief.
 struct BeliefPeaks {
   static constexpr int outside = -2;  ///< in the place of a peak: of none

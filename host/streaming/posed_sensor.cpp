@@ -113,7 +113,7 @@ struct PosedSensor::Impl {
 
   // What is wrong with a line. Throws Error with these words where it stands in a file.
   std::string words_about(std::uint64_t line, const std::string& words) const {
-    const std::string text = fmt::format(
+    std::string text = fmt::format(
         "{}, line {}: {}; write {{\"time\": s, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}}, "
         "or CSV with these columns",
         lines.name(), line, words);

@@ -64,7 +64,7 @@ OccupancyGrid built(Device& device, const OccupancyGrid& map, double prior) {
 }  // namespace
 
 OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior) {
-  const OccupancyGrid other = built(device, map, prior);
+  OccupancyGrid other = built(device, map, prior);
   if (map.drawn) {
     return other;
   }
