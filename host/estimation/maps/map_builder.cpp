@@ -157,7 +157,7 @@ struct MapBuilder::Impl {
     return support_radius_mm(options.sensor, all.readings);
   }
   /// Throws Error where the device cannot hold these cells.
-  void require_room(const CellRange& cells) const;
+  void require_room(const CellRange& needed) const;
   /// Returns the cells of a map of all these readings. Throws Error where they are too many.
   CellRange range_of(const Seen& all) const;
   void grow(const CellRange& needed);
@@ -179,14 +179,14 @@ struct MapBuilder::Impl {
   OwnProcess process;
 };
 
-void MapBuilder::Impl::require_room(const CellRange& cells) const {
+void MapBuilder::Impl::require_room(const CellRange& needed) const {
   const gpu::Limits& limits = context.limits();
-  if (bytes_of(cells) > std::min({limits.storage_range, limits.allocation, limits.memory})) {
+  if (bytes_of(needed) > std::min({limits.storage_range, limits.allocation, limits.memory})) {
     throw Error(
         Fault::input,
         fmt::format("the map would have {} x {} cells of {} mm, more than device '{}' binds "
                     "at once; use larger cells, or touches that lie closer together",
-                    cells.nx, cells.ny, options.cell_mm, context.name()));
+                    needed.nx, needed.ny, options.cell_mm, context.name()));
   }
 }
 

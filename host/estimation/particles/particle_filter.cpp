@@ -221,12 +221,12 @@ struct ParticleFilter::Impl {
   /// Log of the summed weights of every object's particles, which may be far below what exp() can
   /// tell from 0; -infinity where an object has no particle.
   std::vector<double> log_sums(const Weighed& found) const {
-    std::vector<LogSum> sums(objects);
+    std::vector<LogSum> of_object(objects);
     for (std::size_t i = 0; i < found.states.size(); ++i) {
-      sums[found.states[i].object].add(found.log_weights[i]);
+      of_object[found.states[i].object].add(found.log_weights[i]);
     }
     std::vector<double> logs;
-    std::ranges::transform(sums, std::back_inserter(logs), &LogSum::log);
+    std::ranges::transform(of_object, std::back_inserter(logs), &LogSum::log);
     return logs;
   }
 

@@ -37,9 +37,9 @@ double largest_in(const Extremes& range, const ContactModel& contact, Reading re
   const double nodes_per_nat = last / (table.last_log_odds - table.first_log_odds);
   // A node too many on either side leaves bounds true: rounding must not leave one out.
   constexpr double rounding = 1e-6;
-  const auto node_after = [&](double log_odds, double margin) {
+  const auto node_after = [&](double log_odds, double spare) {
     const double place = (log_odds - table.first_log_odds) * nodes_per_nat;
-    return static_cast<std::size_t>(std::clamp(place, 0.0, last) + 1.0 + margin);
+    return static_cast<std::size_t>(std::clamp(place, 0.0, last) + 1.0 + spare);
   };
   double highest = std::max(at(range.least), at(range.most));
   for (std::size_t i = node_after(range.least, -rounding);
