@@ -23,27 +23,6 @@ constexpr std::uint64_t copies_of_a_chunk = 5;
 // Largest compression ratio of HDF5's own filters: deflate turns at most 258 bytes into 2 bits.
 constexpr std::uint64_t largest_compression = 1032;
 
-// A file's filters must not load code, nor its links open other files, which may be FIFOs. Links
-// are refused where libhdf5 has to keep them for others.
-class ConfinedSession {
- public:
-  explicit ConfinedSession(const std::filesystem::path& path) : mark_(path) {
-    H5PLget_loading_state(&plugins_);
-    H5PLset_loading_state(0);
-    if (is_reading_watched()) {
-      H5Lunregister(H5L_TYPE_EXTERNAL);
-    }
-  }
-  ~ConfinedSession() { H5PLset_loading_state(plugins_); }
-  ConfinedSession(const ConfinedSession&) = delete;
-  ConfinedSession& operator=(const ConfinedSession&) = delete;
-
- private:
-  Hdf5Session session_;
-  ReadingMark mark_;
-  unsigned plugins_ = 0;
-};
-
 /// Reads the shape of a dataspace, which may be invalid; false where the file is damaged.
 bool read_shape(hid_t space, std::vector<std::uint64_t>& shape) {
   const int rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;

@@ -2,10 +2,13 @@
 
 #include <hdf5.h>
 
+#include <filesystem>
 #include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "io/watched_reading.hpp"
 
 namespace palpate {
 
@@ -27,6 +30,27 @@ class Hdf5Session {
   std::lock_guard<std::mutex> lock_;
   H5E_auto2_t print_ = nullptr;  ///< how the program wants HDF5's errors printed
   void* data_ = nullptr;
+};
+
+/// A session for a file of others': its filters must not load code, nor its links open other files,
+/// which may be FIFOs. Links are refused where libhdf5 has to keep them for others.
+class ConfinedSession {
+ public:
+  explicit ConfinedSession(const std::filesystem::path& path) : mark_(path) {
+    H5PLget_loading_state(&plugins_);
+    H5PLset_loading_state(0);
+    if (is_reading_watched()) {
+      H5Lunregister(H5L_TYPE_EXTERNAL);
+    }
+  }
+  ~ConfinedSession() { H5PLset_loading_state(plugins_); }
+  ConfinedSession(const ConfinedSession&) = delete;
+  ConfinedSession& operator=(const ConfinedSession&) = delete;
+
+ private:
+  Hdf5Session session_;
+  ReadingMark mark_;
+  unsigned plugins_ = 0;
 };
 
 /// Owns an HDF5 identifier, which may be invalid.
