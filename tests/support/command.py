@@ -7,6 +7,7 @@ import pathlib
 import pty
 import select
 import shutil
+import signal
 import subprocess
 import tempfile
 import termios
@@ -16,6 +17,7 @@ from collections.abc import Callable
 from typing import Any
 
 COMMAND = os.environ["PALPATE_COMMAND"]
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored by what a shell runs in the background
 
 
 Ended = subprocess.CompletedProcess[str]
