@@ -7,7 +7,6 @@ import json
 import os
 import pathlib
 import re
-import signal
 import socket
 import subprocess
 from collections.abc import Callable, Iterator
@@ -42,8 +41,8 @@ class Paged:
         self.url, self.port = match[1], int(match[2])
 
     def end(self) -> str:
-        """Ends the command as Ctrl-C does, and returns what it has said."""
-        self.process.send_signal(signal.SIGINT)
+        """Ends the command as `kill` does, and returns what it has said."""
+        self.process.terminate()
         said, _ = self.process.communicate(timeout=60)
         assert self.process.returncode == 0, said
         return said

@@ -88,6 +88,7 @@ training = palpate.simulate("E", seed=1)
 builder = palpate.MapBuilder(device)
 builder.add(training)
 grid = builder.build("E")
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
 
 def interrupted(call, **options):
     running, ended, sent = threading.Event(), threading.Event(), []
