@@ -238,8 +238,10 @@ void live(const LiveArguments& options) {
                                 : "the board is back");
     }
     if (page) {
-      const std::lock_guard lock(mutex);
-      page->update(state, last_finding);
+      std::unique_lock lock(mutex);
+      const std::string finding = last_finding;
+      lock.unlock();
+      page->update(state, finding);
     }
   }
   if (page) {
