@@ -239,7 +239,7 @@ void live(const LiveArguments& options) {
     }
     if (page) {
       std::unique_lock lock(mutex);
-      const std::string finding = last_finding;
+      std::string finding = last_finding;
       lock.unlock();
       page->update(state, finding);
     }
