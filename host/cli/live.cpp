@@ -238,9 +238,11 @@ void live(const LiveArguments& options) {
                                 : "the board is back");
     }
     if (page) {
-      std::unique_lock lock(mutex);
-      std::string finding = last_finding;
-      lock.unlock();
+      std::string finding;
+      {
+        const std::lock_guard lock(mutex);
+        finding = last_finding;
+      }
       page->update(state, finding);
     }
   }
