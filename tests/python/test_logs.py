@@ -247,7 +247,7 @@ REFUSED: dict[str, tuple["Files | str | bytes", list[str], str]] = {
     "no_gap": ({}, ["--largest-gap-s", "0"], "--largest-gap-s 0: give seconds above 0"),
     "half_a_normal": ({}, ["--plane", "0,0"], "--plane 0,0: give auto"),
     "normal_of_no_length": ({}, ["--plane", "0,0,0"], "--plane 0,0,0: give auto"),
-    "truth_without_a_label": ({}, ["--truth", "1,2,3"], "--truth 1,2,3: give LABEL,X,Y,THETA"),
+    "truth_without_a_label": ("time,p0,p1\nx,1,2\n", ["--truth", "1,2,3"], "--truth 1,2,3: give LABEL,X,Y,THETA"),
     "truth_of_an_empty_label": ({}, ["--truth", ",1,2,3"], "--truth ,1,2,3: give LABEL,X,Y,THETA"),
     "truth_too_far": ({}, ["--truth", "A,0,1e12,0"], "--truth A,0,1e12,0: is further than 1e+09 mm"),
     "array_without_columns": ({}, ["--array", "0:1:2"], "--array 0:1:2: give COLUMNS:ROWS:PITCH, with 1 to 1024"),
