@@ -21,7 +21,7 @@ namespace {
 
 using gpu::Access;
 
-constexpr VkDeviceSize table_bytes = 16 << 20;
+constexpr VkDeviceSize most_table_bytes = 16 << 20;
 // A batch of whole products, so that it does not matter which elements share one.
 constexpr std::size_t factors = shaders::FACTORS_PER_LOG;
 
@@ -189,7 +189,7 @@ std::size_t DenseLikelihood::batch_for(const gpu::Context& context, const PoseLa
   // What bounds a dispatch: the table, the kernel's loops (at most half of their iterations are for
   // the elements of one segment, see accumulate()), and the work. Below 16 elements reading and
   // writing the belief would begin to count.
-  const std::size_t by_table = table_bytes / bytes_per_element(lattice);
+  const std::size_t by_table = most_table_bytes / bytes_per_element(lattice);
   std::int64_t bins = 0;
   for (const SlabExtent& slab : DenseBelief::cut(context, lattice, objects)) {
     bins = std::max(bins, slab.object_count * slab.bins());
