@@ -53,6 +53,17 @@ TEST(Log, TellsWhatADestructorCouldNotThrow) {
   log.expect_one(LogLevel::error, "frames.h5");
 }
 
+TEST(Library, PrintsNothing) {
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  Device device = Device::open();
+  EXPECT_EQ(letter_maps(device).size(), 3U);
+  EXPECT_THROW(read_recording("/nonexistent.h5"), Error);
+  EXPECT_THROW(read_map("/dev/null"), Error);
+  EXPECT_THROW(Device::open("no such device"), Error);
+  EXPECT_EQ(testing::internal::GetCapturedStdout() + testing::internal::GetCapturedStderr(), "");
+}
+
 TEST(LibraryDeathTest, AMessageOfValidationEndsTheProgramAndIsLogged) {
   testing::GTEST_FLAG(death_test_style) = "threadsafe";
   EXPECT_DEATH(
