@@ -238,8 +238,12 @@ void live(const LiveArguments& options) {
                                 : "the board is back");
     }
     if (page) {
-      const std::lock_guard lock(mutex);
-      page->update(state, last_finding);
+      std::string finding;
+      {
+        const std::lock_guard lock(mutex);
+        finding = last_finding;
+      }
+      page->update(state, finding);
     }
   }
   if (page) {

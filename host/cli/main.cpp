@@ -69,10 +69,15 @@ struct FormerFlag {
   std::string_view remedy;   ///< what to do instead, as a clause that begins with a verb
 };
 
+constexpr std::string_view no_device_memory =
+    "give --filter bounded, which needs no memory of the device, or fewer --bins";
+
 constexpr FormerFlag former_flags[] = {
     {"", "--help-all", "give --help, which explains every flag"},
-    {"", "--memory-mib",
-     "give --filter bounded, which needs no memory of the device, or fewer --bins"},
+    {"batch", "--memory-mib", no_device_memory},
+    {"live", "--memory-mib", no_device_memory},
+    {"plan", "--memory-mib", no_device_memory},
+    {"recognize", "--memory-mib", no_device_memory},
     {"batch", "--update", "give -o a new folder where recordings, maps or flags have changed"},
     {"calibrate", "--png",
      "draw it in Python, by palpate.calibrate(...).after.plot() and .sensor.plot()"},
@@ -170,6 +175,12 @@ int complain_of_output() {
                   "standard output: cannot be written; free disk space, or read it to its end");
 }
 
+int complain_of_memory() {
+  return complain(
+      failed,
+      "out of memory; end other programs, or use smaller files, fewer bins, objects or cells");
+}
+
 /// The exit status after a command has succeeded: 0, or 1 where a part of its output was lost.
 int finish() {
   return std::fflush(stdout) != 0 || std::ferror(stdout) != 0 ? complain_of_output() : 0;
@@ -244,13 +255,11 @@ int run_supervised(int argc, char** argv) {
     return run(argc, argv);
   } catch (const Error& error) {
     return complain(error.fault() == Fault::input ? wrong_input : failed, error.what());
+  } catch (const std::bad_alloc&) {
+    return complain_of_memory();
+  } catch (const std::length_error&) {  // more than any memory
+    return complain_of_memory();
   } catch (const std::exception& error) {
-    if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
-        dynamic_cast<const std::length_error*>(&error) != nullptr) {  // more than any memory
-      return complain(
-          failed,
-          "out of memory; end other programs, or use smaller files, fewer bins, objects or cells");
-    }
     // fmt::print throws where standard output cannot be written, without naming it.
     return std::ferror(stdout) != 0 ? complain_of_output() : complain(failed, error.what());
   }

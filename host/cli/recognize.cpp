@@ -14,6 +14,7 @@
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/record_table.hpp"
+#include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "io/atomic_file.hpp"
 #include "palpate/files.hpp"

@@ -152,8 +152,8 @@ void add_record(CLI::App& app) {
   add_required(*command, "-o,--output", options->output,
                "Recording of frames to write (HDF5); replaces an older file");
   command->add_option("--seconds", options->seconds,
-                      "Stop after this time, s [default: at Ctrl-C]. Required for a simulation of "
-                      "more than 10 MB/s without touches=N");
+                      "Stop after this time, s [default: at Ctrl-C]. Required for a simulation "
+                      "at speed=max without touches=N");
   add_with_default(*command, "--tare", options->tare_s,
                    "Duration of the tare at the start, s: nothing may touch the array, and the "
                    "median of its frames becomes the baseline. If it is touched, or an element has "

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <map>
 #include <numeric>
-#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -143,19 +142,26 @@ std::string summary(const std::vector<RecognitionRecord>& records) {
 /// Within which angles theta of symmetric objects is given, once for each label. Touches may tell
 /// the turns of a map that looks alike apart.
 std::string symmetries(const std::vector<RecognitionRecord>& records, const RecognitionTask& task) {
-  std::set<std::pair<std::string, int>> symmetric;  // label, n
+  std::map<std::string, std::map<int, int>> records_of;  // [label, symmetry]
   for (const RecognitionRecord& record : records) {
     const RecognitionStep& step = record.last();
-    if (step.symmetry != 1) {
-      symmetric.emplace(task.labels[task.label_of[step.mode.object]], step.symmetry);
-    }
+    ++records_of[task.labels[task.label_of[step.mode.object]]][step.symmetry];
   }
   std::string text;
-  for (const auto& [label, n] : symmetric) {
-    text += fmt::format(
-        "{} looks the same after {}: its theta is given {}\n", printable(label),
-        n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n),
-        n == 0 ? "as 0" : fmt::format("from {:.4g} to {:.4g} deg", -180.0 / n, 180.0 / n));
+  for (const auto& [label, counts] : records_of) {
+    for (const auto& [n, count] : counts) {
+      if (n == 1) {
+        continue;
+      }
+      const std::string whose =
+          counts.size() == 1
+              ? ": its"
+              : fmt::format(", as far as the touches of {} of these unknowns tell: their", count);
+      text += fmt::format(
+          "{} looks the same after {}{} theta is given {}\n", printable(label),
+          n == 0 ? "any turn" : fmt::format("every 1/{} of a turn", n), whose,
+          n == 0 ? "as 0" : fmt::format("from {:.4g} to {:.4g} deg", -180.0 / n, 180.0 / n));
+    }
   }
   return text;
 }

@@ -3,13 +3,12 @@
 #include <string>
 #include <vector>
 
-#include "figures/figures.hpp"
 #include "recognition/live_recognition.hpp"
 #include "recognition/recognition_record.hpp"
 
 namespace palpate::cli {
 
-// What people read of records, and of each touch of a stream: tables and pictures.
+// What people read of records, and of each touch of a stream.
 
 /// Dropped mass of a bounded posterior, rounded up to one digit: "3e-07"; "" without a certificate.
 std::string dropped_text(const RecognitionStep& step);
@@ -30,14 +29,6 @@ std::string findings(const std::vector<RecognitionRecord>& records, const Recogn
 /// known, how many are right and the mean pose errors.
 std::string result_table(const std::vector<RecognitionRecord>& records,
                          const RecognitionTask& task);
-
-/// Where one object's belief lies; a single empty cell where it has none.
-PlacedBelief belief_of(const Recogniser& recogniser, int object);
-
-/// The picture of one recognised unknown: its result in words, its touches, its trace.
-/// @param belief of the object of the last step's mode
-RecognitionSheet sheet_of(const RecognitionRecord& record, const Query& unknown,
-                          const RecognitionTask& task, PlacedBelief belief);
 
 // A table for people, whose lines are printed as touches come.
 std::string live_heading(const RecognitionTask& task);

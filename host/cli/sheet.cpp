@@ -1,3 +1,5 @@
+#include "cli/sheet.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -92,7 +94,7 @@ RecognitionSheet sheet_of(const RecognitionRecord& record, const Query& unknown,
   sheet.result = std::string(!decided            ? ""
                              : last.decision.act ? "Act: "
                                                  : "Do not act: ") +
-                 shortened(identity_words(last, task), longest_identity) + ": " +
+                 shorten_middle(identity_words(last, task), longest_identity) + ": " +
                  printed(pose_words(last.T_robot_object(), sd_at_peak(last)));
   sheet.captions = captions(record, task);
   sheet.map = task.hypotheses[last.mode.object].map;

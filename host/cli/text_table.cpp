@@ -37,9 +37,16 @@ std::string_view head(std::string_view text, std::size_t columns) {
 
 }  // namespace
 
-std::string shortened(std::string_view text, std::size_t columns) {
-  return columns_of(text) <= columns ? std::string(text)
-                                     : std::string(head(text, columns - 3)) + "...";
+std::string shorten_middle(std::string_view text, std::size_t columns) {
+  constexpr std::string_view ellipsis = "...";
+  const std::size_t length = columns_of(text);
+  if (length <= columns) {
+    return std::string(text);
+  }
+  const std::size_t kept = columns - ellipsis.size();
+  const std::size_t tail = kept / 2;
+  return std::string(head(text, kept - tail)) + std::string(ellipsis) +
+         std::string(text.substr(head(text, length - tail).size()));
 }
 
 std::string percent(double share) { return fmt::format("{:.1f} %", 100.0 * share); }

@@ -12,9 +12,9 @@ struct Scores;
 
 namespace palpate::cli {
 
-/// The text, or its beginning and "...", in at most `columns` columns, 3 or more. Every character
-/// counts as one column.
-std::string shortened(std::string_view text, std::size_t columns);
+/// The text, or its beginning and end with "..." between them, in at most `columns` columns, 3 or
+/// more. Every character counts as one column.
+std::string shorten_middle(std::string_view text, std::size_t columns);
 
 /// A share as "12.3 %".
 std::string percent(double share);

@@ -102,12 +102,12 @@ class PressWatch {
                    glm::distance(press_->first_pose->translation_mm, pose->translation_mm));
     }
   }
-  /// Takes the end of a press, and whether it makes touches.
+  /// Takes the end of the press whose frames add() took, and whether it makes touches.
   void end(bool makes_touches) {
-    if (!makes_touches) {
+    if (!makes_touches && ++missed_ <= most_shown) {
       const std::string press = fmt::format("the press {:.1f} s from its start, of {:.2f} s,",
                                             press_->begin_s - *first_s_, last_s_ - press_->begin_s);
-      missed_.push_back(
+      reasons_.push_back(
           press_->moved_mm >= options_.steady_mm
               ? fmt::format("{} moved by {:.1f} mm (hold the array still, or give --slide MM)",
                             press, press_->moved_mm)
@@ -119,22 +119,19 @@ class PressWatch {
   }
 
   /// Presses without a touch.
-  std::size_t missed() const { return missed_.size(); }
+  std::size_t missed() const { return missed_; }
   /// Why no press made a touch, and what to give, in sentences.
   /// @param unit of the pressures
   std::vector<std::string> reasons(const std::string& unit) const {
-    constexpr std::size_t most_shown = 3;
-    if (missed_.empty()) {
+    if (missed_ == 0) {
       return {
           fmt::format("its readings reach {:.3g} {} above their rest, {:.1f} s from its start, and "
                       "a touch begins above {:g} (lower --onset)",
                       largest_, unit, largest_s_, options_.onset)};
     }
-    std::vector<std::string> words = missed_;
-    if (words.size() > most_shown) {
-      words.resize(most_shown);
-      words.push_back(
-          fmt::format("and {} more presses make no touch", missed_.size() - most_shown));
+    std::vector<std::string> words = reasons_;
+    if (missed_ > most_shown) {
+      words.push_back(fmt::format("and {} more presses make no touch", missed_ - most_shown));
     }
     return words;
   }
@@ -152,7 +149,9 @@ class PressWatch {
   std::optional<Press> press_;  ///< under way
   double largest_ = 0.0;        ///< pressure above the rest
   double largest_s_ = 0.0;      ///< when, from the first frame on
-  std::vector<std::string> missed_;
+  static constexpr std::size_t most_shown = 3;
+  std::size_t missed_ = 0;
+  std::vector<std::string> reasons_;  ///< of the first most_shown that were missed
 };
 
 /// Appends the touch and a row of `valid` for it, `unposed` at the pose 0; returns false where the

@@ -17,6 +17,7 @@
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
 #include "recognition/label_probability.hpp"
+#include "recognition/object_fit.hpp"
 
 namespace palpate {
 

@@ -1,17 +1,14 @@
 #pragma once
 
 #include <span>
-#include <string>
-#include <vector>
 
-#include "model/touch_evidence.hpp"
 #include "palpate/lattice.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "recognition/recognition_record.hpp"
 
 namespace palpate {
 
-// What a step says of the belief about its pose, whether to act on it, and what looks wrong.
+// What a step says of the belief about its pose, and whether to act on it.
 
 /// The n-fold symmetry of the mode's object as far as touches tell: its map's, or where that is 1
 /// and the belief spreads over turns after which the map looks the same, the one that the map shows
@@ -33,15 +30,5 @@ BeliefPlaces places_of(const Recogniser& recogniser, const Estimate& estimate,
 /// Verdict::does_not_fit, and 95 % of the belief lies within `act.below_mm` of pose(). By bounds it
 /// is the lower bound of the probability that counts. Else says which of them is not so.
 Decision decide(const RecognitionStep& step, const RecognitionTask& task);
-
-/// What looks wrong with an unknown's touches, or else with the lattice on which they were
-/// evaluated. Each warning is a sentence that names the evidence and the remedy. Touches that look
-/// right and lie well within the region give none.
-/// @param touches all touches of the unknown so far
-/// @param lattice the task's, about the pivot in use
-/// @param step what the filter believes after them; its own warnings are not read
-std::vector<std::string> warnings_about(std::span<const TouchEvidence> touches,
-                                        const RecognitionTask& task, const PoseLattice& lattice,
-                                        const RecognitionStep& step);
 
 }  // namespace palpate

@@ -120,10 +120,12 @@ void LiveRecognition::leave_out(std::size_t touch, bool out) {
   });
 }
 
-void LiveRecognition::between_touches(std::function<void()> work) {
+void LiveRecognition::between_touches(std::function<void()> work) { push(std::move(work)); }
+
+void LiveRecognition::push(std::function<void()> job) {
   {
     const std::lock_guard lock(mutex_);
-    jobs_.push_back(std::move(work));
+    jobs_.push_back(std::move(job));
   }
   changed_.notify_all();
 }
@@ -261,8 +263,9 @@ void LiveRecognition::hand_on(const std::optional<DetectedTouch>& touch) {
     ++state_.without_pose;
     return;
   }
-  between_touches(
-      [this, used = UsedTouch{*touch, counters().lost}, taken = taken_] { use(used, taken); });
+  push([this, used = UsedTouch{*touch, counters().lost}, taken = taken_]() mutable {
+    use(std::move(used), taken);
+  });
 }
 
 void LiveRecognition::believe() {
@@ -278,7 +281,7 @@ void LiveRecognition::believe() {
       }
       continue;
     }
-    const std::function<void()> job = std::move(jobs_.front());
+    std::function<void()> job = std::move(jobs_.front());
     jobs_.pop_front();
     lock.unlock();
     changed_.notify_all();

@@ -298,12 +298,13 @@ std::string limit_words(const Plan& plan) {
   if (gain <= gain_for(unknown, plan.goal) + least_gain_nats) {
     return "";
   }
-  return fmt::format(
-      "the best gain is above what is unknown, which is counted in bins: the touch tells also "
-      "where "
-      "in its bin the pose is, or {} samples stand for the belief only roughly; give more "
-      "`samples`",
-      samples);
+  return plan.goal == PlanGoal::identity
+             ? fmt::format(
+                   "the best gain is above what is unknown: {} samples stand for the belief only "
+                   "roughly; give more `samples`",
+                   samples)
+             : "the best gain is above what is unknown, which is counted in bins: the touch tells "
+               "also where in its bin the pose is";
 }
 
 }  // namespace palpate

@@ -1,3 +1,5 @@
+#include "recognition/warnings.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,7 +18,6 @@
 #include "model/bounding_box.hpp"
 #include "model/element_spacing.hpp"
 #include "recognition/belief_cells.hpp"
-#include "recognition/decision.hpp"
 
 namespace palpate {
 

@@ -223,6 +223,20 @@ TEST(PageServer, EndsAsSoonAsItHasBegun) {
   }
 }
 
+TEST(PageServer, AcceptsNoMoreConnectionsThanItHasRoomFor) {
+  const Page page({.reading = never, .connections = 4});
+  std::vector<std::unique_ptr<Client>> clients;
+  const auto connects = [&] {
+    clients.push_back(std::make_unique<Client>(page.port()));
+    return clients.back()->ready(POLLOUT, 200ms);
+  };
+  while (clients.size() < 50 && connects()) {
+  }
+  EXPECT_LT(clients.size(), 50u);
+  clients.clear();
+  EXPECT_TRUE(answer_to(page, request("GET /")).starts_with("HTTP/1.1 200 "));
+}
+
 TEST(PageServer, AnAddressOfAnotherMachineIsNamed) {
   expect_named(
       input_error([&] { cli::PageServer({.host = "192.0.2.1", .port = 0}, {}); }),

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "cli/record_table.hpp"
+#include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "recognition/record_json.hpp"
 #include "support/sample_files.hpp"

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "recognition/filter_choice.hpp"
+#include "recognition/object_fit.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/scales.hpp"
 #include "shapes.hpp"

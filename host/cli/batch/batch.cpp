@@ -176,6 +176,7 @@ void batch(const BatchArguments& options) {
     folder.make();
     job.device();  // opens it before the line of progress is there
     Progress progress("recognising");
+    const auto recognising = std::chrono::steady_clock::now();
     const BatchRun run{.folder = folder,
                        .task = task,
                        .job = job,
@@ -187,7 +188,7 @@ void batch(const BatchArguments& options) {
       const auto done = static_cast<double>(counts.done);
       progress.show(
           done / static_cast<double>(run.to_be_done),
-          fmt::format(", {:.0f} per second{}", done / seconds_since(begin),
+          fmt::format(", {:.0f} per second{}", done / seconds_since(recognising),
                       counts.failed > 0 ? fmt::format(", {} failed", counts.failed) : ""));
     });
   }

@@ -17,6 +17,7 @@
 
 #include "cli/options.hpp"
 #include "cli/step_words.hpp"
+#include "estimation/bounded/search_memory.hpp"
 #include "io/input_file.hpp"
 #include "recognition/batch/input_reading.hpp"
 #include "recognition/record_json.hpp"
@@ -63,10 +64,7 @@ std::size_t most_at_once(const RecognitionTask& task, std::size_t threads) {
   // A device that has few bins waits for the host, unless another thread gives it work meanwhile.
   constexpr double filling_bins = 4e6;
   constexpr double limit = 16.0;
-  // In float64, as counts of three axes may exceed an integer.
-  const PoseLattice& lattice = task.lattice();
-  const double bins = static_cast<double>(task.hypotheses.size()) * lattice.x_mm.count *
-                      lattice.y_mm.count * lattice.theta_rad.count;
+  const double bins = bins_in_all(task.hypotheses.size(), task.lattice());
   return std::min(threads, static_cast<std::size_t>(std::clamp(filling_bins / bins, 1.0, limit)));
 }
 

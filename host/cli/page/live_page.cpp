@@ -7,6 +7,7 @@
 
 #include "cli/page/page_json.hpp"
 #include "cli/record_table.hpp"
+#include "cli/sheet.hpp"
 #include "cli/step_words.hpp"
 #include "model/option_words.hpp"
 #include "palpate/error.hpp"

@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
+#include <semaphore>
 #include <thread>
 #include <utility>
 
@@ -153,6 +154,25 @@ class LimitedStream : public httplib::Stream {
   Clock::duration patience_ = most_patience_;
 };
 
+/// Threads for connections. Where many wait, the next are not accepted, so that they cannot take
+/// all file descriptors of the program.
+class Connections : public httplib::ThreadPool {
+ public:
+  Connections(int threads, int limit)
+      : httplib::ThreadPool(static_cast<std::size_t>(threads)), room_(limit) {}
+
+  void enqueue(std::function<void()> serve) override {
+    room_.acquire();
+    httplib::ThreadPool::enqueue([this, serve = std::move(serve)] {
+      serve();
+      room_.release();
+    });
+  }
+
+ private:
+  std::counting_semaphore<> room_;
+};
+
 }  // namespace
 
 void add_page_flags(CLI::App& command, PageAddress& address) {
@@ -189,7 +209,9 @@ struct PageServer::Impl : httplib::Server {
     if (ended < 0) {
       throw Error(Fault::system, "the page: no file descriptor is left; end other programs");
     }
-    new_task_queue = [] { return new httplib::ThreadPool(most_pages + other_requests); };
+    new_task_queue = [this] {
+      return new Connections(most_pages + other_requests, limits.connections);
+    };
   }
   ~Impl() override { ::close(ended); }
 

@@ -39,6 +39,7 @@ struct RequestLimits {
   std::size_t bytes = 16384;                ///< of a request: its head and its body
   std::chrono::milliseconds reading{2000};  ///< until the whole request is there
   std::chrono::milliseconds writing{5000};  ///< that a client stops taking the answer
+  int connections = 64;                     ///< that are served or wait; others are not accepted
 };
 
 /// Serves Palpate's page over HTTP from construction on: its files, the events of its feed

@@ -48,12 +48,12 @@ double node_bytes(const OccupancyGrid& map) {
   return (map.nx + border) * (map.ny + border) * MapPatches::side * sizeof(float);
 }
 
+}  // namespace
+
 double bins_in_all(std::size_t objects, const PoseLattice& lattice) {
   return static_cast<double>(objects) * lattice.x_mm.count * lattice.y_mm.count *
          lattice.theta_rad.count;
 }
-
-}  // namespace
 
 SearchMemory search_memory(std::span<const Hypothesis> hypotheses, const BoundedOptions& options) {
   const PoseLattice& lattice = options.lattice;

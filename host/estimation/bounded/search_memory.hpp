@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -18,6 +19,9 @@ struct SearchMemory {
   double largest_family = 0.0;  ///< bins that the smallest tiles of one larger tile hold
   double total() const { return tables + tiles + bins; }
 };
+
+/// The bins of all objects. In float64, as the product of three axes' counts may exceed an integer.
+double bins_in_all(std::size_t objects, const PoseLattice& lattice);
 
 /// Allocates nothing. What the search takes while it divides tiles is not foreseen.
 /// @param options checked, with a resolved contact model

@@ -303,7 +303,7 @@ std::string difference_of_inputs(const BatchTask& before, const BatchTask& now) 
                          old.path == entry.path ? " with other frames or label" : "");
     }
     if (old.stamp != entry.stamp) {
-      return entry.path + (entry.stamp ? " has changed" : " is gone");
+      return entry.path + (!entry.stamp ? " is gone" : !old.stamp ? " is new" : " has changed");
     }
   }
   return before.inputs.size() == now.inputs.size()
