@@ -217,7 +217,7 @@ TEST_P(ParticleLaws, AgreesWithFloat64) {
   for (const ParticleFilter::Particle& particle : filter.particles()) {
     identity[particle.object] += particle.weight;
   }
-  EXPECT_LT(largest_difference(estimate.identity, identity), 1e-5) << "float32 sums within blocks";
+  EXPECT_LT(largest_difference(estimate.identity, identity), 1e-12);
   EXPECT_TRUE(std::isfinite(estimate.mode.log_likelihood));
   double evidence = 0.0;
   for (const double log_evidence : estimate.log_evidence) {
