@@ -179,7 +179,7 @@ def as_many(a: int, b: int) -> bool:
     return 10 * abs(a - b) <= max(a, b)
 
 
-def plot(axes: Axes, run: Json, path: str, label: str, scale: float = 1.0, **look: Any) -> str:
+def plot(axes: Axes, run: Json, path: str, label: str, scale: float = 1.0, **look: Any) -> str | None:
     """A field over touches, with a mark at every fifth, so that the dashes show between: the colour."""
     return charts.series(axes, run["curve"], "touches", path, label, scale, markevery=5, **look)
 

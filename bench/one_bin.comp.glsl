@@ -5,7 +5,7 @@
 // invocation, one theta per workgroup, everything in storage buffers, one exp and one log per
 // element.
 
-#include "../shaders/interface.h"
+#include "one_bin_push.h"
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const float RANDOM_FLOOR = 0.02;  // gamma m
@@ -18,14 +18,7 @@ layout(std430, binding = 1) readonly buffer Axes { Split axis[]; };  // nx of x,
 layout(std430, binding = 2) readonly buffer Elements { RotatedElement rotated[]; };
 layout(std430, binding = 3) readonly buffer Segments { Segment segment[]; };
 layout(std430, binding = 4) buffer Belief { vec2 belief[]; };  // [theta, y, x]
-layout(push_constant) uniform Push {  // OneBinPush of baselines.cpp
-  uint nx;
-  uint ny;
-  uint segments;
-  uint elements;  // per theta in the table
-  int map_width;  // with border
-  int map_height;
-} push;
+layout(push_constant) uniform Push { OneBinPush push; };
 
 // Bilinear in log odds. Outside the map both nodes are of the border and hold the prior.
 float interpolate(const Split bin_x, const Split bin_y, const RotatedElement element) {

@@ -9,10 +9,17 @@
 
 namespace palpate {
 
-PacketDeframer::PacketDeframer(PacketFormat format) : format_(std::move(format)) {}
+PacketDeframer::PacketDeframer(PacketFormat format) : format_(std::move(format)) {
+  if (format_.check) {
+    sums_.emplace(format_.check->checksum);
+  }
+}
 
 void PacketDeframer::push(Bytes bytes, std::vector<Frame>& frames) {
   buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  if (sums_) {
+    sums_->push(bytes);
+  }
   while (at_ < buffer_.size() && take_step(frames)) {
   }
   // The last terminator stays: it tells where the next packet begins.
@@ -20,6 +27,9 @@ void PacketDeframer::push(Bytes bytes, std::vector<Frame>& frames) {
   // Erase once half of the buffer is consumed: erasing at each push would move the rest each time.
   if (2 * consumed >= buffer_.size()) {
     buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(consumed));
+    if (sums_) {
+      sums_->erase(consumed);
+    }
     at_ -= consumed;
   }
 }
@@ -37,7 +47,7 @@ bool PacketDeframer::take_step(std::vector<Frame>& frames) {
     return false;
   }
   const Bytes packet = stream.first(*bytes);
-  if (!format_.checksum_is_right(packet)) {
+  if (!checksum_is_right(packet)) {
     counters_.checksum_errors += in_step_ ? 1 : 0;
     return drop_byte();
   }
@@ -77,6 +87,19 @@ bool PacketDeframer::follows_terminator() const {
   const std::size_t bytes = format_.terminator.size();
   return at_ >= bytes &&
          begins_like(Bytes(buffer_).subspan(at_ - bytes, bytes), format_.terminator);
+}
+
+bool PacketDeframer::checksum_is_right(Bytes packet) const {
+  if (!sums_) {
+    return true;
+  }
+  const PacketFormat::Check& check = *format_.check;
+  const std::size_t begin = format_.begin_of(check.place, packet.size());
+  const std::size_t from = check.after ? begin + check.place.bytes : check.from_byte;
+  const std::size_t end = check.after ? packet.size() : begin;
+  const NumberType type{.bytes = static_cast<std::uint8_t>(check.checksum.bytes),
+                        .big_endian = check.big_endian};
+  return type.read(packet.subspan(begin)) == sums_->of(at_ + from, at_ + end);
 }
 
 bool PacketDeframer::decode(Bytes packet, std::vector<Frame>& frames) {

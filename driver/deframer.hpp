@@ -30,7 +30,9 @@ namespace palpate {
 ///   frame may be taken for the preamble until it changes, and a lost byte spoils its frame.
 ///
 /// A frame may come in several packets: each with one Part of it, or its clock before its values.
-/// Memory: two packets of the largest size and the bytes of two pushes.
+/// The work per byte is bounded for any input: a checksum costs the same for all packets, and at
+/// most 4096 bytes of parts are read in vain, in formats without checksum only. Memory: two packets
+/// of the largest size and the bytes of two pushes, five times as much in formats with a checksum.
 class PacketDeframer {
  public:
   using Bytes = PacketFormat::Bytes;
@@ -54,6 +56,8 @@ class PacketDeframer {
   /// Returns true: a step is taken.
   bool drop_byte();
   bool follows_terminator() const;
+  /// Whether the packet at at_ has the right checksum, or the format has none.
+  bool checksum_is_right(Bytes packet) const;
   /// Decodes a packet, and appends the frames that it completes; false where it is malformed.
   bool decode(Bytes packet, std::vector<Frame>& frames);
   /// Finds the parts in front of the first whose tag is not known; false where one is cut short.
@@ -66,8 +70,9 @@ class PacketDeframer {
   void complete_frame(std::vector<Frame>& frames);
 
   PacketFormat format_;
-  std::vector<std::uint8_t> buffer_;  // recent bytes of the stream
-  std::size_t at_ = 0;                // index of the first byte not yet consumed
+  std::vector<std::uint8_t> buffer_;     // recent bytes of the stream
+  std::optional<RunningChecksum> sums_;  // of buffer_, in formats with a checksum
+  std::size_t at_ = 0;                   // index of the first byte not yet consumed
   bool in_step_ = true;
   SensorCounters counters_;
   std::vector<double> values_;        // of the frame in progress

@@ -1,5 +1,6 @@
 #include "driver/packet_format.hpp"
 
+#include <algorithm>
 #include <bit>
 
 namespace palpate {
@@ -30,24 +31,67 @@ std::uint32_t after_byte(std::uint32_t crc, std::uint32_t byte, std::uint32_t po
   return crc;
 }
 
+/// The image of a register under a linear map that is given by the images of its bits.
+std::uint32_t image_of(std::uint32_t sum, std::span<const std::uint32_t> images) {
+  std::uint32_t image = 0;
+  for (; sum != 0; sum &= sum - 1) {
+    image ^= images[static_cast<std::size_t>(std::countr_zero(sum))];
+  }
+  return image;
+}
+
 }  // namespace
 
-std::uint32_t Checksum::of(std::span<const std::uint8_t> covered) const {
-  std::uint32_t sum = kind == Kind::weiss ? 0xffff : init;
-  for (const std::uint8_t byte : covered) {
-    switch (kind) {
-      case Kind::sum:
-        sum += byte;
-        break;
-      case Kind::exor:
-        sum ^= byte;
-        break;
-      case Kind::crc:
-        sum = after_byte(sum, reflect ? reflected(byte, 8) : byte, polynomial, bytes);
-        break;
-      case Kind::weiss:
-        sum = sum >> 8 ^ after_byte(0, (sum ^ byte) & 0xff, 0x1021, bytes);
+RunningChecksum::RunningChecksum(const Checksum& checksum) : checksum_(checksum) {
+  Map& one = zeros_.emplace_back();
+  for (std::size_t bit = 0; bit < 8 * checksum_.bytes; ++bit) {
+    one[bit] = after(1u << bit, 0);
+  }
+  while (zeros_.size() < 18) {
+    const Map half = zeros_.back();
+    std::ranges::transform(half, zeros_.emplace_back().begin(),
+                           [&](std::uint32_t sum) { return image_of(sum, half); });
+  }
+}
+
+void RunningChecksum::push(std::span<const std::uint8_t> bytes) {
+  for (const std::uint8_t byte : bytes) {
+    sums_.push_back(after(sums_.back(), byte));
+  }
+}
+
+void RunningChecksum::erase(std::size_t bytes) {
+  sums_.erase(sums_.begin(), sums_.begin() + static_cast<std::ptrdiff_t>(bytes));
+}
+
+std::uint32_t RunningChecksum::after(std::uint32_t sum, std::uint8_t byte) const {
+  switch (checksum_.kind) {
+    case Checksum::Kind::sum:
+      return sum + byte;
+    case Checksum::Kind::exor:
+      return sum ^ byte;
+    case Checksum::Kind::crc:
+      return after_byte(sum, checksum_.reflect ? reflected(byte, 8) : byte, checksum_.polynomial,
+                        checksum_.bytes);
+    case Checksum::Kind::weiss:
+      break;
+  }
+  return sum >> 8 ^ after_byte(0, (sum ^ byte) & 0xff, 0x1021, checksum_.bytes);
+}
+
+std::uint32_t RunningChecksum::of(std::size_t begin, std::size_t end) const {
+  const auto& [kind, bytes, polynomial, init, xor_out, reflect] = checksum_;
+  std::uint32_t sum = kind == Checksum::Kind::weiss ? 0xffff : init;
+  if (kind == Checksum::Kind::sum) {
+    sum += sums_[end] - sums_[begin];
+  } else {
+    // Registers are linear in their first value and the bytes: where only the first values differ,
+    // the last ones differ as if all bytes were zero.
+    sum ^= sums_[begin];
+    for (std::size_t i = 0; i < zeros_.size(); ++i) {
+      sum = (end - begin) >> i & 1u ? image_of(sum, zeros_[i]) : sum;
     }
+    sum ^= sums_[end];
   }
   return ((reflect ? reflected(sum, 8 * bytes) : sum) ^ xor_out) & mask_of(bytes);
 }
@@ -89,18 +133,6 @@ std::optional<std::size_t> PacketFormat::packet_bytes(Bytes stream) const {
     }
   }
   return total;
-}
-
-bool PacketFormat::checksum_is_right(Bytes packet) const {
-  if (!check) {
-    return true;
-  }
-  const std::size_t begin = begin_of(check->place, packet.size());
-  const Bytes covered = check->after ? packet.subspan(begin + check->place.bytes)
-                                     : packet.subspan(check->from_byte, begin - check->from_byte);
-  const NumberType type{.bytes = static_cast<std::uint8_t>(check->checksum.bytes),
-                        .big_endian = check->big_endian};
-  return type.read(packet.subspan(begin)) == check->checksum.of(covered);
 }
 
 }  // namespace palpate

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -23,8 +24,28 @@ struct Checksum {
   std::uint32_t init = 0;
   std::uint32_t xor_out = 0;
   bool reflect = false;
+};
 
-  std::uint32_t of(std::span<const std::uint8_t> covered) const;
+/// Checksums of stretches of a stream. The work for one is bounded whatever its length: where every
+/// byte begins like a packet, a sum over each of these packets would not keep up with the line.
+class RunningChecksum {
+ public:
+  explicit RunningChecksum(const Checksum& checksum);
+
+  void push(std::span<const std::uint8_t> bytes);
+  /// Forgets the first bytes; the others' indices fall by their number.
+  void erase(std::size_t bytes);
+  /// The checksum of the bytes [begin, end), at most 2^18 - 1.
+  std::uint32_t of(std::size_t begin, std::size_t end) const;
+
+ private:
+  using Map = std::array<std::uint32_t, 32>;  // a linear map, by the images of the register's bits
+
+  std::uint32_t after(std::uint32_t sum, std::uint8_t byte) const;
+
+  Checksum checksum_;
+  std::vector<std::uint32_t> sums_{0};  // the register before each byte and after the last
+  std::vector<Map> zeros_;              // of 2^i zero bytes
 };
 
 /// The type of a number in a packet.
@@ -140,9 +161,6 @@ struct PacketFormat {
   /// where it begins with no packet, more than the stream has where more bytes have to come first.
   /// The checksum is not looked at.
   std::optional<std::size_t> packet_bytes(Bytes stream) const;
-
-  /// Whether a packet has the right checksum, or the format has none.
-  bool checksum_is_right(Bytes packet) const;
 };
 
 }  // namespace palpate

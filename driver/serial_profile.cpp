@@ -35,7 +35,8 @@ std::string text_of(const std::filesystem::path& path) {
   }
   if (!file.is_open()) {
     throw Error(Fault::input,
-                fmt::format("{}: no such profile that can be read; check the path", path.string()));
+                fmt::format("{}: cannot be read as a profile; check the path and its permissions",
+                            path.string()));
   }
   return {std::istreambuf_iterator<char>(file), {}};
 }

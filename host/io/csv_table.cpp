@@ -110,11 +110,12 @@ void TextLines::append_utf16(std::string_view bytes) {
   std::mbstate_t state{};
   const char16_t* read = units.data();
   char8_t* written = text.data();
-  const auto result =
-      std::use_facet<Utf>(std::locale::classic())
-          .out(state, read, read + units.size(), read, written, written + text.size(), written);
-  if (result == Utf::error) {
-    refuse(path_, "is no text in UTF-16, as its first bytes say; save the table in UTF-8");
+  // Half of a pair of units is no character: U+FFFD stands for it, as a note may be cut anywhere.
+  while (std::use_facet<Utf>(std::locale::classic())
+             .out(state, read, units.data() + units.size(), read, written,
+                  text.data() + text.size(), written) == Utf::error) {
+    written = std::ranges::copy(std::u8string_view(u8"\uFFFD"), written).out;
+    ++read;
   }
   block_.append(text.data(), written);
   left_.erase(0, 2 * static_cast<std::size_t>(read - units.data()));

@@ -59,12 +59,14 @@ std::optional<double> take_clock(std::string_view& text) {
   return is_time ? std::optional(hours * 3600.0 + minutes * 60.0 + seconds) : std::nullopt;
 }
 
-/// Takes YYYY-MM-DD, or DD.MM.YYYY; the seconds of its midnight since the Unix epoch.
+/// Takes YYYY-MM-DD, or DD.MM.YYYY; the seconds of its midnight since the Unix epoch. None, and
+/// nothing is taken, where the text does not begin with a date.
 std::optional<double> take_date(std::string_view& text) {
-  auto numbers = take_numbers(text, "0000-00-00");
-  numbers = numbers ? numbers : take_numbers(text, "0000/00/00");
+  std::string_view rest = text;
+  auto numbers = take_numbers(rest, "0000-00-00");
+  numbers = numbers ? numbers : take_numbers(rest, "0000/00/00");
   if (!numbers) {
-    numbers = take_numbers(text, "00.00.0000");
+    numbers = take_numbers(rest, "00.00.0000");
     if (!numbers) {
       return {};
     }
@@ -72,8 +74,11 @@ std::optional<double> take_date(std::string_view& text) {
   }
   using namespace std::chrono;
   const year_month_day date{year((*numbers)[0]), month((*numbers)[1]), day((*numbers)[2])};
-  return date.ok() ? std::optional(day_s * sys_days(date).time_since_epoch().count())
-                   : std::nullopt;
+  if (!date.ok()) {
+    return {};
+  }
+  text = rest;
+  return day_s * sys_days(date).time_since_epoch().count();
 }
 
 /// Seconds of a date and time by ISO 8601, such as 2026-11-29T12:41:27.5+01:00, since the Unix

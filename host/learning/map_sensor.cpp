@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -174,15 +175,15 @@ void or_say_why_not(const MapRequest& request, LearnedMaps& learned, const Learn
   }
 }
 
-/// Whether learn_maps() wrote a sensor model.
-bool is_of_maps(const std::filesystem::path& file) {
+/// Whether learn_maps() wrote a sensor model; none where it is no sensor model.
+std::optional<bool> is_of_maps(const std::filesystem::path& file) {
   try {
     return !read_sensor_model(file).maps.empty();
   } catch (const Error& error) {
     if (error.fault() != Fault::input) {
       throw;
     }
-    return false;
+    return {};
   }
 }
 
@@ -195,19 +196,24 @@ bool learns_sensor(const MapRequest& request, std::vector<std::string>& remarks)
   if (!request.to_folder() || request.output.empty() || !std::filesystem::exists(file, ignored)) {
     return asked;
   }
-  const bool own = is_of_maps(file);
-  if (own && !asked) {
+  const std::optional<bool> own = is_of_maps(file);
+  if (!own) {
+    remarks.push_back(fmt::format(
+        "{}: was not written by palpate map, and stays; {}it is no sensor model, and recognition "
+        "with maps of this folder refuses it until it is mended or moved",
+        file.string(), asked ? "no sensor is learned; " : ""));
+  } else if (*own && !asked) {
     remarks.push_back(fmt::format(
         "{}: stays, and was learned for earlier maps: recognition leaves it out with others; "
         "remove it, or build the maps without `sensor-model`",
         file.string()));
-  } else if (!own && asked) {
+  } else if (!*own && asked) {
     remarks.push_back(fmt::format(
         "{0}: was not written by palpate map, and stays; no sensor is learned. To recognise with "
         "it, give `sensor-model {0}` here and to recognition",
         file.string()));
   }
-  return asked && own;
+  return asked && own.value_or(false);
 }
 
 void learn_sensor(const MapTask& task, const MapOptions& options, LearnedMaps& learned,

@@ -158,14 +158,16 @@ Trials cross_validate(const LearnedPresses& learned, const std::vector<std::stri
   for (std::size_t fold = 0; fold < settings.folds; ++fold) {
     const std::vector<Press> others = presses_without(fold, learned.presses, settings.folds);
     const auto show_learning = work.part(count * table_cost);
+    const auto show_trials = work.part((count + 1.0) / folds);
     if (others.size() < learned.presses.size()) {  // else there are fewer groups than folds
       const std::vector<FoldModel> models = models_of(others, settings, show_learning);
       for (std::size_t i = 0; i < models.size(); ++i) {
         CrossValidation& found = i < trials.tables.size() ? trials.tables[i] : trials.eq7;
         found += try_fold(fold, learned.presses, labels, models[i], settings);
+        show_trials(static_cast<double>(i + 1) / static_cast<double>(models.size()));
       }
     }
-    work.part((count + 1.0) / folds)(1.0);
+    show_trials(1.0);
   }
   for (TriedModel& one : trials.tables) {
     one.after = tempered_by_folds(one.unknowns);

@@ -2,18 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <functional>
 #include <map>
 #include <numbers>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "learning/progress.hpp"
 #include "learning/setup_judge.hpp"
 #include "model/bounding_box.hpp"
 #include "model/map_likelihood.hpp"
@@ -101,25 +104,28 @@ bool at_one_place(const SetupJudge& judge, const Setup& setup) {
 }
 
 /// The best mount of the array anywhere in the tool, in every unit and order that a turn of the
-/// array does not make; the given one where all touches are at one angle.
-Pose mount_found_widely(const SetupJudge& judge, const Setup& setup) {
+/// array does not make; none where all touches are at one angle.
+std::optional<Pose> mount_found_widely(const SetupJudge& judge, const Setup& setup,
+                                       const std::function<void(double)>& progress) {
   std::vector<PoseUnit> units = possible_units(judge, setup);
   units.insert(units.begin(), PoseUnit());
+  const std::vector<ElementOrder> orders = orders_but_for_turns(setup.elements_mm);
+  Progress work(static_cast<double>(units.size() * orders.size()), progress);
   std::optional<Summit<Pose>> best;
   for (const PoseUnit& unit : units) {
-    for (const ElementOrder& order : orders_but_for_turns(setup.elements_mm)) {
+    for (const ElementOrder& order : orders) {
       Setup tried = unit.of(setup);
       tried.elements_mm = order.elements_mm;
-      if (at_one_angle(judge, tried.rad)) {
-        continue;
+      if (!at_one_angle(judge, tried.rad)) {
+        const Summit<Pose> found = search_mount(judge, tried);
+        if (!best || found.value - best->value > least_share * std::abs(best->value)) {
+          best = found;
+        }
       }
-      const Summit<Pose> found = search_mount(judge, tried);
-      if (!best || found.value - best->value > least_share * std::abs(best->value)) {
-        best = found;
-      }
+      work.add();
     }
   }
-  return best ? best->place : Pose{};
+  return best ? std::optional(best->place) : std::nullopt;
 }
 
 /// Elements that always, or never, read contact, against what their places predict.
@@ -218,51 +224,62 @@ std::vector<SetupFinding> findings_of_logs(std::span<const Recording> recordings
 
 /// What is found in a search that begins at a set-up, and how the touches fit in the one it ends
 /// at.
-std::pair<SetupCheck, SetupFit> checked(SetupJudge& judge, const Setup& setup) {
+struct CheckedSetup {
+  SetupCheck check;
+  SetupFit fit;
+  bool one_place = false;  ///< see at_one_place(), in the unit that was found
+
+  bool is_sound() const { return fit.is_sound(!check.findings.empty()); }
+};
+
+CheckedSetup checked(SetupJudge& judge, const Setup& setup,
+                     const std::function<void(double)>& progress) {
+  Progress work(5.0, progress);
   SetupSearch search{judge, setup};
   check_units(search);
-  if (at_one_place(judge, search.setup)) {
+  work.add();
+  const bool one_place = at_one_place(judge, search.setup);
+  if (one_place) {
     search.check.remarks.emplace_back(
         "all touches of an object are at nearly one place and angle of the sensor, which tells "
         "nothing of the array: move and turn the sensor between the touches");
   } else {
     check_order(search);
+    work.add();
     check_offset(search);
+    work.add();
     check_pitch(search);
+    work.add();
   }
   check_elements(search);
   check_touches(search);
   search.check.elements_mm = search.setup.mounted_mm();
-  return {std::move(search.check), judge.fit(search.setup)};
+  return {std::move(search.check), judge.fit(search.setup), one_place};
 }
 
 SetupCheck checked_widely(SetupJudge& judge, const Setup& given,
                           const std::function<void(double)>& progress) {
-  SetupCheck check;
-  SetupFit fit;
-  const auto is_sound_from = [&](const Setup& setup) {
-    std::tie(check, fit) = checked(judge, setup);
-    return fit.is_sound(!check.findings.empty());
-  };
-  if (is_sound_from(given) || at_one_place(judge, given)) {
-    return check;
+  Progress work(3.0, progress);
+  CheckedSetup found = checked(judge, given, work.part(1.0));
+  if (found.is_sound() || found.one_place) {
+    return found.check;
   }
-  if (progress) {
-    progress(0.5);
+  if (const auto mount = mount_found_widely(judge, given, work.part(1.0))) {
+    Setup mounted = given;
+    mounted.mount = *mount;
+    found = checked(judge, mounted, work.part(1.0));
   }
-  Setup mounted = given;
-  mounted.mount = mount_found_widely(judge, given);
-  if (!is_sound_from(mounted)) {
-    check.findings = {
+  if (!found.is_sound()) {
+    found.check.findings = {
         {"unexplained", 0.0,
          fmt::format("nothing that was tried explains these touches: {} of {} do not fit the map "
                      "of the others; look at the clock of the poses (`pose-delay`), whether "
                      "every pose is that of its touch, at the signs of x, y and the angle, where "
                      "the array is mounted, and whether an object moved or was changed",
-                     fit.misfits, fit.touches)}};
-    check.elements_mm = given.elements_mm;
+                     found.fit.misfits, found.fit.touches)}};
+    found.check.elements_mm = given.elements_mm;
   }
-  return check;
+  return found.check;
 }
 
 /// Whether all touches of a recording have this array.
@@ -278,11 +295,11 @@ std::optional<SetupFinding> suspected_order(Device& device, std::span<const Reco
   constexpr std::size_t least_touches = 20;
   constexpr std::size_t most_touches = 40;
   const Setup setup{.elements_mm = recordings.front().elements_mm};
-  std::vector<Recording> few;
+  std::vector<const Recording*> few;
   for (const Recording& recording : recordings) {
     if (recording.size() >= least_touches && has_array(recording, setup.elements_mm) &&
         few.size() < most_objects) {
-      few.push_back(recording);
+      few.push_back(&recording);
     }
   }
   if (few.empty()) {
@@ -307,7 +324,9 @@ std::optional<SetupFinding> suspected_order(Device& device, std::span<const Reco
 SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
                        const MapOptions& options, const std::function<void(double)>& progress) {
   const Setup given{.elements_mm = recordings.front().elements_mm};
+  std::vector<const Recording*> all;
   for (const Recording& recording : recordings) {
+    all.push_back(&recording);
     if (!has_array(recording, given.elements_mm)) {
       throw Error(Fault::input,
                   fmt::format("{}: its array is not that of all touches; check recordings of one "
@@ -317,15 +336,18 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
   }
   const std::vector<SetupFinding> logged = findings_of_logs(recordings);
   SetupCheck check{.elements_mm = given.elements_mm};
+  std::optional<SetupJudge> judge;
   try {
-    SetupJudge judge(device, recordings, options);
-    check = checked_widely(judge, given, progress);
+    judge.emplace(device, all, options);
   } catch (const Error& error) {
     if (error.fault() != Fault::input || logged.empty()) {
       throw;
     }
     // What is wrong with the logs may be why there are few touches.
     check.remarks.emplace_back(error.what());
+  }
+  if (judge) {
+    check = checked_widely(*judge, given, progress);
   }
   check.findings.insert(check.findings.end(), logged.begin(), logged.end());
   return check;

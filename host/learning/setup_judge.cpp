@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <glm/geometric.hpp>
 
@@ -36,22 +37,22 @@ Pose Setup::pose_of(const TriedTouch& given) const {
   return {mm * pose.translation_mm, rad * pose.theta_rad};
 }
 
-SetupJudge::SetupJudge(Device& device, std::span<const Recording> recordings,
+SetupJudge::SetupJudge(Device& device, std::span<const Recording* const> recordings,
                        const MapOptions& options, std::size_t most_touches)
     : device_(device), options_(options) {
   bool all_in_contact = true;
-  for (const Recording& recording : recordings) {
-    touches_[recording.object];  // an object that was never in contact is missed
-    const std::size_t stride = (recording.size() - 1) / most_touches + 1;
-    for (std::size_t i = 0; i < recording.size(); i += stride) {
-      const Touch touch = recording.touch(i);
+  for (const Recording* recording : recordings) {
+    // An object that was never in contact is missed.
+    std::vector<TriedTouch>& tried = touches_[recording->object];
+    const std::size_t stride = (recording->size() - 1) / most_touches + 1;
+    for (std::size_t i = 0; i < recording->size(); i += stride) {
+      const Touch touch = recording->touch(i);
       TouchEvidence evidence(touch, {.classifier = options.classifier});
       all_in_contact =
           all_in_contact &&
           std::ranges::find(evidence.readings, Reading::no_contact) == evidence.readings.end();
       if (evidence.in_contact()) {
-        touches_[recording.object].push_back(
-            {touch, std::move(evidence.readings), recording.path, i});
+        tried.push_back({touch, std::move(evidence.readings), recording->path, i});
       }
     }
   }
@@ -176,6 +177,12 @@ struct MountedTouches {
   double span_mm = 0.0;  ///< of the poses about the middle
 };
 
+/// The map of one object. Between uses all is 0, and it is kept: most squares are never met.
+struct Squares {
+  std::vector<std::array<std::uint32_t, 2>> counts;  ///< [y, x] of No Contact, In Contact
+  std::vector<std::size_t> used;                     ///< whose counts are not 0
+};
+
 /// Judges mounts by a map of squares, in each of which all readings of an object are one
 /// Beta-distributed share of contact.
 class MountSearch {
@@ -254,13 +261,13 @@ class MountSearch {
     for (const glm::dvec2& p : elements_mm_) {
       elements_mm.push_back(place * p);
     }
+    auto& [counts, used] = squares_.local();
     double sum = 0.0;
     for (const MountedTouches& object : objects_) {
       const double half_mm =
           object.span_mm + glm::length(place.translation_mm) + reach_mm_ + square_mm;
       const std::size_t side = static_cast<std::size_t>(2.0 * half_mm / square_mm) + 2;
-      std::vector<std::array<std::uint32_t, 2>> counts(side * side);  // No Contact, In Contact
-      std::vector<std::size_t> used;
+      counts.resize(std::max(counts.size(), side * side));
       const glm::dvec2 corner = object.middle_mm - half_mm;
       for (std::size_t i = 0; i < object.poses.size(); i += every) {
         const glm::dvec2 along = rotate(object.poses[i].theta_rad, {1.0 / square_mm, 0.0});
@@ -281,7 +288,9 @@ class MountSearch {
       for (const std::size_t square : used) {
         const auto& [none, contact] = counts[square];
         sum += log_gamma_half_[none] + log_gamma_half_[contact] - log_factorial_[none + contact];
+        counts[square] = {};
       }
+      used.clear();
     }
     return sum;
   }
@@ -297,6 +306,7 @@ class MountSearch {
   double reach_mm_ = 0.0;
   std::vector<double> log_gamma_half_;  ///< [n] lgamma(n + 1/2) - lgamma(1/2)
   std::vector<double> log_factorial_;
+  mutable tbb::enumerable_thread_specific<Squares> squares_;
 };
 
 }  // namespace

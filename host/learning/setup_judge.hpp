@@ -71,7 +71,8 @@ class SetupJudge {
   /// @param most_touches of each that count, evenly chosen
   /// @throws Error where an object has fewer than four touches in contact, or all elements are in
   /// contact in all touches
-  SetupJudge(Device& device, std::span<const Recording> recordings, const MapOptions& options,
+  SetupJudge(Device& device, std::span<const Recording* const> recordings,
+             const MapOptions& options,
              std::size_t most_touches = std::numeric_limits<std::size_t>::max());
 
   /// Log-likelihood of all readings (Eq. 7), in nats; -1e300 where the touches lie so far apart

@@ -61,7 +61,7 @@ std::optional<Frame> LineSensor::next(std::chrono::milliseconds timeout) {
 
 void LineSensor::take(const LineReader::Line& line) {
   if (line.too_long) {
-    refuse_line(line, {.words = "is longer than any frame"});
+    refuse_line(line, {FrameLines::Flaw::Kind::too_long, "is longer than any frame"});
     return;
   }
   const double read_s = host_clock_s();

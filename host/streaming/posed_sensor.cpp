@@ -75,11 +75,11 @@ struct PosedSensor::Impl {
   }
 
   void take_line(const LineReader::Line& line) {
-    const auto read = line.too_long ? FrameLines::Flaw{.words = "is longer than any pose"}
+    const auto read = line.too_long ? FrameLines::Flaw{Kind::too_long, "is longer than any pose"}
                                     : format.read(line.text, 0.0);
     if (const auto* flaw = std::get_if<FrameLines::Flaw>(&read)) {
       ++malformed;
-      flaws.add(flaw->kind, words_about(line.number, flaw->words));
+      flaws.add(flaw->kind, words_or_throw(line.number, flaw->words));
     } else if (const auto* frame = std::get_if<Frame>(&read)) {
       const double before_s = track.last_s().value_or(frame->host_time_s);
       ++poses;
@@ -99,20 +99,21 @@ struct PosedSensor::Impl {
     if (track.dropped() != dropped) {
       const char* when = time_s <= before_s ? "not later than" : "far later than";
       flaws.add(Kind::out_of_order,
-                words_about(line, fmt::format("time = {} s is {} the poses around it, at {} s",
-                                              time_s, when, before_s)));
+                words_or_throw(line, fmt::format("time = {} s is {} the poses around it, at {} s",
+                                                 time_s, when, before_s)));
     }
     if (track.set_back() != set_back) {  // those poses have joined the track
-      flaws.say(Kind::clock_set_back,
-                words_about(line, fmt::format("time = {} s is not later than the pose before, at "
-                                              "{} s, and the poses after it go on from there: the "
-                                              "robot's clock was set",
-                                              time_s, before_s)));
+      flaws.say(
+          Kind::clock_set_back,
+          words_or_throw(line, fmt::format("time = {} s is not later than the pose before, at "
+                                           "{} s, and the poses after it go on from there: the "
+                                           "robot's clock was set",
+                                           time_s, before_s)));
     }
   }
 
-  // What is wrong with a line. Throws Error with these words where it stands in a file.
-  std::string words_about(std::uint64_t line, const std::string& words) const {
+  // What is wrong with a line of a stream. Throws Error with these words where it stands in a file.
+  std::string words_or_throw(std::uint64_t line, const std::string& words) const {
     std::string text = fmt::format(
         "{}, line {}: {}; write {{\"time\": s, \"x_mm\": mm, \"y_mm\": mm, \"theta_rad\": rad}}, "
         "or CSV with these columns",

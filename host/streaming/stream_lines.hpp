@@ -80,9 +80,18 @@ class LineReader {
 /// separate the cells where a line has three or more.
 class FrameLines {
  public:
-  /// Why a line is refused. Frames are in any order; of poses, the track judges it.
+  /// What is wrong with a line. PoseTrack finds the last two, which frames do not have; a clock
+  /// that was set back refuses no line.
   struct Flaw {
-    enum class Kind { malformed, no_number, far_away, out_of_order, clock_set_back };
+    enum class Kind {
+      malformed,
+      too_long,
+      no_number,
+      far_away,
+      out_of_order,
+      clock_set_back,
+      kinds
+    };
     Kind kind = Kind::malformed;
     std::string words;
   };
@@ -146,7 +155,7 @@ class RefusedLines {
  private:
   std::function<void(const std::string&)> warn_;
   std::string first_;
-  std::bitset<5> told_;  ///< kinds
+  std::bitset<static_cast<std::size_t>(FrameLines::Flaw::Kind::kinds)> told_;
 };
 
 }  // namespace palpate

@@ -65,8 +65,8 @@ void choose_rows(const ImportOptions& options, std::size_t n, Recording& recordi
   recording.rows = options.rows;
 }
 
-/// The label and the pose of `truth`, whose numbers are in these units of x, y and theta.
-Truth truth_of(const std::string& text, const std::array<Unit, 3>& units) {
+/// The label and the numbers of `truth`.
+std::pair<std::string, std::array<double, 3>> truth_parts(const std::string& text) {
   std::string label = text;  // which may hold commas itself
   std::array<double, 3> pose{};
   for (std::size_t i = pose.size(); i-- > 0;) {
@@ -76,10 +76,17 @@ Truth truth_of(const std::string& text, const std::array<Unit, 3>& units) {
     if (!number) {
       refuse(fmt::format("`truth {}`", text), "give LABEL,X,Y,THETA, in the units of the poses");
     }
-    pose[i] = units[i].convert(*number);
+    pose[i] = *number;
     label.resize(comma);
   }
-  const Pose T_object_robot{{pose[0], pose[1]}, pose[2]};
+  return {label, pose};
+}
+
+/// The label and the pose of `truth`, whose numbers are in these units of x, y and theta.
+Truth truth_of(const std::string& text, const std::array<Unit, 3>& units) {
+  const auto [label, pose] = truth_parts(text);
+  const Pose T_object_robot{{units[0].convert(pose[0]), units[1].convert(pose[1])},
+                            units[2].convert(pose[2])};
   if (!is_robot_pose(T_object_robot)) {
     refuse(fmt::format("`truth {}`", text),
            "is further than {:g} mm or turned by more than 1e9 rad; check the numbers and "
@@ -109,6 +116,9 @@ void check_numbers(const ImportOptions& options) {
           "is for poses; give `poses`");
   require(!options.unposed || options.poses.empty(), "unposed",
           options.poses + " holds the poses; leave one of them out");
+  if (!options.truth.empty()) {
+    truth_parts(options.truth);  // how far it is depends on the units of the poses' table
+  }
 }
 
 /// The pose of `mount`; none where it is not given.

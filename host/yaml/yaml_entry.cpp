@@ -4,9 +4,11 @@
 #include <iterator>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <string_view>
 
 #include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
 
 #include "model/number_text.hpp"
 #include "model/printable.hpp"
@@ -19,29 +21,23 @@ namespace {
 /// Counted from 1, also where there is no mark, as in an empty file.
 int line_of(const YAML::Mark& mark) { return std::max(mark.line, 0) + 1; }
 
-/// The line, from 1, at which a second document begins, of which YAML::Load() reads nothing; 0
-/// where the text has one.
-int second_document(std::string_view text) {
-  constexpr std::string_view blanks = " \t\r";
-  bool begun = false;
-  bool ended = false;
-  int number = 0;
-  for (const std::string_view line : split_text(text, '\n')) {
-    ++number;
-    const auto is_marker = [&](std::string_view marker) {
-      return line.starts_with(marker) &&
-             (line.size() == marker.size() || blanks.find(line[marker.size()]) != blanks.npos);
-    };
-    const std::size_t first = line.find_first_not_of(blanks);
-    const bool is_content = first != line.npos && line[first] != '#' && line[first] != '%';
-    if ((begun && is_marker("---")) || (ended && is_content)) {
-      return number;
-    }
-    begun = begun || is_content;
-    ended = ended || is_marker("...");
-  }
-  return 0;
-}
+/// Notes where a document begins.
+struct DocumentStart : YAML::EventHandler {
+  void OnDocumentStart(const YAML::Mark& mark) override { at = mark; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+
+  YAML::Mark at;
+};
 
 }  // namespace
 
@@ -50,11 +46,18 @@ void read_document(std::istream&& yaml, const std::filesystem::path& file, const
   const std::string text(std::istreambuf_iterator<char>(yaml), {});
   try {
     const YAML::Node document = YAML::Load(text);
-    if (const int line = second_document(text); line > 0) {
+    // YAML::LoadAll() finds documents without end in some text that is no YAML. Most text has no
+    // marker between documents, which UTF-16 would hide, and is not parsed again.
+    const auto holds = [&](std::string_view part) { return text.find(part) != std::string::npos; };
+    DocumentStart second;
+    std::istringstream again(text);
+    YAML::Parser parser(again);
+    if ((holds("---") || holds("...") || holds({"\0", 1})) && parser.HandleNextDocument(second) &&
+        parser.HandleNextDocument(second)) {
       throw Error(Fault::input,
                   fmt::format("{}: line {}: a second document, of which nothing would "
                               "be read; leave one, without --- after it",
-                              file.string(), line));
+                              file.string(), line_of(second.at)));
     }
     read({file, key, document});
   } catch (const YAML::Exception& error) {

@@ -2,7 +2,6 @@
 
 import contextlib
 import importlib
-import os
 import re
 import shutil
 import tempfile
@@ -211,9 +210,8 @@ def opened(name: str) -> Iterator[Bag]:
         raise Error(f"{name}: no such file or folder; give a bag")
     if (path.parent / "metadata.yaml").exists() and re.search(r"\.(db3|mcap)(\.zstd?)?$", name):
         path = path.parent
-    name = os.fspath(path)
     with contextlib.ExitStack() as stack:
-        if name.endswith((".zstd", ".zst")):  # compressed as a whole: a copy is read, which goes
+        if path.suffix in (".zstd", ".zst"):  # compressed as a whole: a copy is read, which goes
             path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / path.stem
             with _readable(name), _zstd().open(name, "rb") as packed, path.open("wb") as plain:
                 shutil.copyfileobj(packed, plain)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import matplotlib
+import numpy
 from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -13,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from ._program import Json, write
-from ._tables import column, value_of
+from ._tables import column
 
 #: Colours of Okabe and Ito, who chose them for every kind of colour vision.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
@@ -67,10 +68,13 @@ def ticks(axis: Axis, text: Callable[[float], str], steps: Sequence[float] = (1.
 
 def series(
     axes: Axes, records: Sequence[Json], x: str, y: str, label: str, scale: float = 1.0, **look: Any
-) -> str:
-    """What paths find in the records that have y, as a line with a look; its colour."""
-    records = [record for record in records if value_of(record, y) is not None]
-    (line,) = axes.plot(column(records, x), scale * column(records, y), label=label, **look)
+) -> str | None:
+    """What paths find in records, as a line with a look and a gap where one has no y; its colour, or None
+    where none has y, and nothing is drawn."""
+    values = scale * column(records, y)
+    if numpy.isnan(values).all():
+        return None
+    (line,) = axes.plot(column(records, x), values, label=label, **look)
     return str(line.get_color())
 
 

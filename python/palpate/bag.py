@@ -107,6 +107,8 @@ def _run(arguments: argparse.Namespace) -> None:
     for flag in ("pressure_topic", "array", "output"):
         if getattr(arguments, flag) is None:
             raise Error(f"--{flag.replace('_', '-')}: missing; --list shows the topics of the log")
+    if arguments.mount == "":  # which to an import is none
+        raise Error("--mount: give X,Y,Z,ROLL,PITCH,YAW, mm and degrees")
     folder = os.path.dirname(arguments.output) or "."
     if os.path.isdir(arguments.output) or not os.access(folder, os.W_OK):
         raise Error(f"-o {arguments.output}: cannot be written; give a file in a folder that exists")

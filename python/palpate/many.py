@@ -307,20 +307,21 @@ def _index_of(
     return None if name.isdecimal() or len(alike) < 2 else alike[place_on_host() % len(alike)]
 
 
-def _place_on_host(number: int = 0) -> int:
-    """The least number from this one on that no other process of this user has taken on this computer.
+def _place_on_host() -> int:
+    """The least number that no other process of this user has taken on this computer.
 
     It is held by a name of the kernel's (an abstract Unix socket) that ends with the process, however
     it ends: the worker that takes the place of a dead one takes its number, too.
     """
     global _place
     place = socket.socket(socket.AF_UNIX)
-    try:
-        place.bind(f"\0palpate.{os.getuid()}.{number}")
-    except OSError as error:
-        place.close()
-        if error.errno != errno.EADDRINUSE:
-            raise
-        return _place_on_host(number + 1)
+    for number in itertools.count():
+        try:
+            place.bind(f"\0palpate.{os.getuid()}.{number}")
+            break
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                place.close()
+                raise
     _place = place
     return number

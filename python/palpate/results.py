@@ -28,7 +28,7 @@ class Drawn:
     """What is drawn with Matplotlib."""
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draws what the class says. Returns the axes."""
+        """Draws this object with Matplotlib, as its class's docstring describes, and returns the axes."""
         from .plots import plot
 
         return plot(self, ax)

@@ -157,7 +157,8 @@ TEST_F(MapSensor, OfAnotherHandStays) {
        {std::pair<std::string, int>{"format: palpate.sensor_model\n", 0}, {"x", 2}}) {
     put_bytes(sensor("maps"), text);
     const std::string said = remarks("map A.h5 U.h5 -o maps/");
-    expect_named(said, {"maps/sensor.yaml: was not written by palpate map, and stays"});
+    expect_named(said, {"maps/sensor.yaml: was not written by palpate map, and stays",
+                        status == 0 ? "To recognise with it" : "until it is mended or moved"});
     EXPECT_EQ(palpate("recognize u.h5 --maps maps --touches=1").status, status);
     EXPECT_EQ(bytes_of(sensor("maps")), text);
   }

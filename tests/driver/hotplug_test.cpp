@@ -1,4 +1,6 @@
 // Boards that are unplugged and plugged in again, while they stream and while they are stopped.
+#include <tuple>
+
 #include "fake_takktile.hpp"
 #include "palpate/driver.hpp"
 #include "streamed.hpp"
@@ -158,17 +160,12 @@ TEST_F(Restart, FailsWhileTheBoardIsAwayAndWorksOnceItIsBack) {
 }
 
 TEST_F(Restart, FindsABoardAtAnotherPortByItsSerialNumberOnlyAndNoOther) {
-  struct Place {
-    const char* serial;
-    const char* other_serial;
-    int other_port;
-    bool found;
-  };
-  for (const Place& place : {Place{"1", "1", 5, true}, {"", "", 5, false}, {"1", "2", 2, false}}) {
-    PluggedIn plugged(usb_, place.serial);
+  for (const auto& [serial, other_serial, other_port, found] :
+       {std::tuple{"1", "1", 5, true}, {"", "", 5, false}, {"1", "2", 2, false}}) {
+    PluggedIn plugged(usb_, serial);
     plugged.unplug();
-    FakeTakktile other(usb_, place.other_serial, {0b11111}, Layout::bits, place.other_port);
-    if (place.found) {
+    FakeTakktile other(usb_, other_serial, {0b11111}, Layout::bits, other_port);
+    if (found) {
       plugged.sensor->start();
       EXPECT_TRUE(other.streaming());
     } else {

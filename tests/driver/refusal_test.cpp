@@ -10,6 +10,7 @@
 #include "fake_takktile.hpp"
 #include "ordinary_user.hpp"
 #include "palpate/driver.hpp"
+#include "support/child_process.hpp"
 #include "support/errors.hpp"
 
 namespace palpate::refusal_test {
@@ -48,13 +49,11 @@ class OtherProgram {
   explicit OtherProgram(const std::string& node) {
     int pipe_ends[2] = {};
     EXPECT_EQ(pipe(pipe_ends), 0);
-    id_ = fork();
-    if (id_ == 0) {
+    id_ = start_child([&] {
       const bool opened = open(node.c_str(), O_RDWR) >= 0;
       (void)!write(pipe_ends[1], &opened, 1);
       pause();
-      _exit(0);
-    }
+    });
     char opened = 0;
     EXPECT_EQ(read(pipe_ends[0], &opened, 1), 1);
     EXPECT_EQ(opened, 1);

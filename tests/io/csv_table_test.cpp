@@ -101,19 +101,17 @@ TEST_F(Csv, NamesAreFoundInAnyCase) {
 }
 
 TEST_F(Csv, ErrorsNameLineAndColumn) {
-  struct Row {
-    const char* rows;  // after a comment, so that the last is line 4
-    const char* named;
-  };
-  for (const auto& [rows, named] : {Row{"a,b\n1,2\n3,abc\n", "column 'b': 'abc' is not a finite"},
-                                    {"a,b\n1,2\n3,inf\n", "column 'b': 'inf'"},
-                                    {"9,8\n1,2\n3,0x1\n", "column '2': '0x1'"},
-                                    {"a,b\n1,2\n3\n", "1 cells, the first row 2"},
-                                    {"a,b\n1,2\n3,4,5\n", "3 cells"},
-                                    {"a,b\n1,2\n3,1.234,5\n", "3 cells"},
-                                    {"a,b\n1,2\n3,\"4\n", "quote is not closed"},
-                                    {"a,b\n1,2\n3,\"4\"5\n", "follows a closing quote"},
-                                    {"a;b\n1;2\n3;1.234,5\n", "'1.234,5'"}}) {
+  // After a comment, so that the last is line 4
+  for (const auto& [rows, named] :
+       {std::pair{"a,b\n1,2\n3,abc\n", "column 'b': 'abc' is not a finite"},
+        {"a,b\n1,2\n3,inf\n", "column 'b': 'inf'"},
+        {"9,8\n1,2\n3,0x1\n", "column '2': '0x1'"},
+        {"a,b\n1,2\n3\n", "1 cells, the first row 2"},
+        {"a,b\n1,2\n3,4,5\n", "3 cells"},
+        {"a,b\n1,2\n3,1.234,5\n", "3 cells"},
+        {"a,b\n1,2\n3,\"4\n", "quote is not closed"},
+        {"a,b\n1,2\n3,\"4\"5\n", "follows a closing quote"},
+        {"a;b\n1;2\n3;1.234,5\n", "'1.234,5'"}}) {
     const std::string said = message("# c\n" + std::string(rows));
     EXPECT_TRUE(said.starts_with(path_.string() + ":4: ")) << said;
     expect_named(said, {named});

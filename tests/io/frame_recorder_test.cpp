@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <functional>
+#include <limits>
 #include <random>
 
 #include "file_parts.hpp"
@@ -34,9 +35,12 @@ TEST_F(FrameRecorderFile, AppearsOnlyWithFrames) {
   }
   EXPECT_EQ(bytes_of(path_), "an older file");
   FrameRecorder recorder(path_, sensor_of(2));
-  recorder.add(frame_of(0, 2));
+  Frame frame = frame_of(0, 2);
+  frame.lost_before = std::numeric_limits<std::uint64_t>::max();  // more than a file holds
+  recorder.add(frame);
   recorder.close();
-  EXPECT_EQ(read_recording(path_).size(), 1u);
+  EXPECT_EQ(recorder.lost(), std::uint64_t{1} << 53);
+  EXPECT_EQ(read_recording(path_).lost_before, (std::vector{std::uint64_t{1} << 53}));
 }
 
 TEST_F(FrameRecorderFile, WithoutAKnownReadingIsLostAndWithOneHasTheOthersUnknown) {
@@ -159,8 +163,7 @@ class FrameRecorderProcess : public FrameRecorderFile {
 TEST_F(FrameRecorderProcess, FileIsReadAsBeingRecordedFromTheMomentItAppears) {
   for (int run = 0; run < trials(6); ++run) {
     SCOPED_TRACE(run);
-    const pid_t pid = ::fork();
-    if (pid == 0) {
+    const pid_t pid = start_child([&] {
       FrameRecorder recorder(path_, sensor_of(elements));
       for (const std::size_t frames : {1000u, 3000u}) {
         while (recorder.frames() < frames) {
@@ -169,8 +172,7 @@ TEST_F(FrameRecorderProcess, FileIsReadAsBeingRecordedFromTheMomentItAppears) {
         recorder.flush();
         ::raise(SIGSTOP);
       }
-      ::_exit(0);
-    }
+    });
     siginfo_t state{};  // of the process: none while it runs
     while (!std::filesystem::exists(path_) && state.si_pid == 0) {
       ::waitid(P_PID, static_cast<id_t>(pid), &state, WSTOPPED | WEXITED | WNOHANG | WNOWAIT);

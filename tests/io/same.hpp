@@ -30,11 +30,10 @@ std::vector<std::uint64_t> bits_of(const std::vector<Value>& list) {
 
 /// All but the path, and whether the file was closed.
 inline void expect_same(const Recording& read, const Recording& written) {
-  EXPECT_EQ(read.object, written.object);
-  EXPECT_EQ(read.sensor, written.sensor);
-  EXPECT_EQ(read.serial, written.serial);
-  EXPECT_EQ(read.pressure_unit, written.pressure_unit);
-  EXPECT_EQ(read.rows, written.rows);
+  for (const auto text : {&Recording::object, &Recording::sensor, &Recording::serial,
+                          &Recording::pressure_unit, &Recording::rows}) {
+    EXPECT_EQ(read.*text, written.*text);
+  }
   EXPECT_EQ(read.valid, written.valid);
   EXPECT_EQ(read.lost_before, written.lost_before);
   for (const auto list : {&Recording::pressure, &Recording::time_s, &Recording::baseline,

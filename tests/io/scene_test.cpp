@@ -53,9 +53,8 @@ none: auto
   EXPECT_EQ(scene.objects[0].mirror, true);
   EXPECT_EQ(scene.objects[0].weight, 2.0);
   EXPECT_EQ(scene.objects[1].map, "/maps/E.map.h5");
-  EXPECT_FALSE(scene.objects[1].label);
-  EXPECT_FALSE(scene.objects[1].symmetry);
-  EXPECT_FALSE(scene.objects[1].mirror);
+  const Scene::Object& bare = scene.objects[1];
+  EXPECT_FALSE(bare.label || bare.symmetry || bare.mirror);
   EXPECT_EQ(scene.objects[1].weight, 1.0);
   EXPECT_EQ(scene.options, (Options{{"sensor-model", (folder_ / "s.yaml").string()},
                                     {"threshold", "2.500"},
@@ -153,9 +152,15 @@ TEST_F(SceneFile, NamesValuesThatItCannotTake) {
 }
 
 TEST_F(SceneFile, IsOneDocumentOfYaml) {
-  EXPECT_EQ(read("---\nratio: 0.3\n...\n").options.at("ratio"), "0.3");
+  for (const char* yaml : {"---\nratio: 0.3\n...\n", "\xEF\xBB\xBF# c\n---\nratio: 0.3\n...\n...\n",
+                           "\xEF\xBB\xBF\n---\nratio: 0.3\n"}) {
+    EXPECT_EQ(read(yaml).options.at("ratio"), "0.3") << yaml;
+  }
   expect_named(message("ratio: 0.3\n---\nbins: auto"), {"line 2", "second document"});
   expect_named(message("ratio: 0.3\n...\n\nbins: auto"), {"line 4", "second document"});
+  const std::u16string wide = u"\uFEFFratio: 0.3\n---\nbins: auto";
+  expect_named(message({reinterpret_cast<const char*>(wide.data()), 2 * wide.size()}),
+               {"line 2", "second document"});
   expect_named(message("ratio: 0.3\nobjects: [1, 2\nbins: 3"), {"line", "YAML"});
   expect_named(input_error([&] { read_scene(folder_ / "no.yaml"); }), {"no.yaml", "no such file"});
 }

@@ -162,7 +162,10 @@ TEST(SetupCheck, GivesNoneForTouchesThatNoSetupExplains) {
     std::ranges::copy_n(other.pressure.begin(), n, two[k].pressure.begin());
     std::ranges::copy_n(other.T_robot_sensor.begin(), half, two[k].T_robot_sensor.begin());
   }
-  for (const Recordings& recordings : {late, two}) {
+  const Recordings metres = posed(sound, [](const Pose& pose) {
+    return Pose{pose.translation_mm / 1000.0, 0.3};
+  });
+  for (const Recordings& recordings : {late, two, metres}) {
     const SetupCheck found = check(recordings);
     EXPECT_THAT(only_finding(found, "unexplained").options, IsEmpty());
     EXPECT_EQ(found.elements_mm, digitacts_array());

@@ -1,5 +1,6 @@
 """Bags of each storage become the recordings of what they hold; what they lack is said."""
 
+import functools
 import math
 import pathlib
 import re
@@ -11,7 +12,7 @@ from typing import Any
 import numpy
 import pytest
 from conftest import error_of, warned
-from program import Done, run_program
+from program import run_program
 
 import palpate
 from palpate import _bag_messages, _bag_transforms, read_bag
@@ -194,7 +195,9 @@ def test_frames_in_a_gap_of_transforms_have_no_pose(tmp_path: pathlib.Path) -> N
     known = ~numpy.isnan(recording.T_robot_sensor[:, 0])
     assert known.tolist() == [True, True, False, False, True, True]
     numpy.testing.assert_allclose(recording.T_robot_sensor[known, 0], [0, 200, 800, 1000], atol=1e-3)
-    wide, _ = warned(read_bag, log, **PLAIN, tf=("base", "array"), largest_gap_s=1)
+    alone = file.rename(tmp_path / "alone.mcap")
+    assert [topic.name for topic in topics(alone)] == ["/plain", "/tf"], "without its folder"
+    wide, _ = warned(read_bag, alone, **PLAIN, tf=("base", "array"), largest_gap_s=1)
     numpy.testing.assert_allclose(wide.T_robot_sensor[:, 0], [200 * i for i in range(6)], atol=1e-3)
 
 
@@ -266,15 +269,14 @@ def test_a_log_that_is_cut_off_or_not_there_is_said(tmp_path: pathlib.Path, mcap
     whole = storage.read_bytes()
     storage.write_bytes(whole[:200])
     assert "mcap: cannot be read as a bag" in error_of(topics, mcap)
+    assert f"mend it by 'mcap recover {storage} -o" in error_of(topics, storage)
     storage.write_bytes(whole[:9] + struct.pack("<Q", 1 << 62) + whole[17:])  # the length of the first record
     assert "mcap: cannot be read as a bag (a part of it does not fit" in error_of(topics, mcap)
     assert "none.bag: no such file" in error_of(topics, tmp_path / "none.bag")
 
 
 def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_path: pathlib.Path) -> None:
-    def run(*arguments: object) -> Done:
-        return run_program(main, *arguments)
-
+    run = functools.partial(run_program, main)
     listed = subprocess.run([sys.executable, "-m", "palpate.bag", mcap, "--list"], capture_output=True, text=True)
     assert listed.returncode == 0 and "lab_msgs/msg/Hand" in listed.stdout, listed.stderr
     file = tmp_path / "f.h5"
@@ -296,6 +298,7 @@ def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_pa
         ((mcap, *flags, "--dead", "auto", "-o", file), "--dead auto: 'auto' is no element"),
         ((mcap, *flags, "--plane", "", "-o", file), "--plane: give auto, or "),
         ((mcap, *flags, "--mount", "auto", "-o", file), "--mount auto: give X,Y,Z,ROLL,PITCH,YAW"),
+        ((mcap, *flags, "--mount", "", "-o", file), "--mount: give X,Y,Z,ROLL,PITCH,YAW, mm and degrees"),
         ((mcap, *flags, "--array", "2:3:2", "-o", file), "array of 6 elements; correct --array\n"),
         ((mcap, *flags, "--tf", "base:head", "-o", file), ": --tf base:head: no chain of transforms"),
         ((mcap, "--pressure-topic", "/hand", *flags[2:], "-o", file), "name one by --pressure-field\n"),

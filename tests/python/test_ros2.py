@@ -11,7 +11,7 @@ from unittest.mock import MagicMock
 
 import numpy
 import pytest
-from conftest import Maps, error_of, warned
+from conftest import Maps, error_of, learned, warned
 from rosbags.typesys import Stores, get_typestore
 
 import palpate
@@ -54,12 +54,14 @@ def sent(message: Any) -> Any:
     return TYPES.deserialize_cdr(TYPES.serialize_cdr(message, name), name)
 
 
-@pytest.fixture(scope="module")
-def record(device: palpate.Device, maps: Maps) -> palpate.Record:
-    """What is recognised of an E that lies at MOVED."""
-    touched = palpate.simulate("E", palpate.random_poses(8, seed=4), T_object_robot=palpate.inverse(MOVED), seed=5)
-    [record] = palpate.recognize(touched, maps, device=device)
-    assert record.best == "E"
+@pytest.fixture(scope="module", params="EI")
+def record(device: palpate.Device, request: pytest.FixtureRequest) -> palpate.Record:
+    """What is recognised of an E, or of an I that half a turn leaves as it is, that lies at MOVED."""
+    of, grids = request.param, [learned(device, letter) for letter in "EI"]
+    grids[1].symmetry = 2
+    touched = palpate.simulate(of, palpate.random_poses(8, seed=4), T_object_robot=palpate.inverse(MOVED), seed=5)
+    [record] = palpate.recognize(touched, grids, device=device)
+    assert record.best == of
     return record
 
 
@@ -130,7 +132,7 @@ def test_markers_show_array_uncertainty_and_label(record: palpate.Record) -> Non
     assert axis @ covariance @ axis == pytest.approx(numpy.linalg.eigvalsh(covariance)[-1], rel=1e-6)
     assert ellipse.scale.y <= ellipse.scale.x
     assert ellipse.pose.position.x == pytest.approx(record.refined.T_robot_object[0] / 1000)
-    assert label.text.startswith("E ") and "fits" in label.text
+    assert label.text.startswith(f"{record.best} ") and "fits" in label.text
 
 
 def test_planar_poses_are_those_of_a_bag(tmp_path: pathlib.Path) -> None:

@@ -66,10 +66,7 @@ TEST(FrameLines, AreReadInEveryForm) {
       {{"1,2,3"}, {1, 2, 3}, now_s},
       {{"1 2 3"}, {1, 2, 3}, now_s},
       // With poses, and with one that is not known
-      {{R"({"pressure": [1, 2, 3], "x_mm": 4, "y_mm": 5, "theta_rad": 6})"},
-       {1, 2, 3},
-       now_s,
-       pose},
+      {{R"({"pressure": [1,2,3], "x_mm": 4, "y_mm": 5, "theta_rad": 6})"}, {1, 2, 3}, now_s, pose},
       {{"7.5,4,5,6,1,2,3"}, {1, 2, 3}, 7.5, pose},
       {{"theta_rad,p0,p1,p2,y_mm,x_mm", "6,1,2,3,5,4"}, {1, 2, 3}, now_s, pose},
       {{"7.5,,nan,,1,2,3"}, {1, 2, 3}},
@@ -209,9 +206,10 @@ TEST_F(LineSensorInput, SkipsRefusedLinesAndSaysEachKindOnce) {
   EXPECT_FALSE(sensor.next(0ms));
   EXPECT_EQ(sensor.refused(), 5u);
   EXPECT_EQ(sensor.counters().lost, 5u);
-  ASSERT_EQ(complaints_.size(), 2u);
+  ASSERT_EQ(complaints_.size(), 3u);
   expect_named(complaints_[0], {"standard input, line 2: column 2 = 'x'", "[3 numbers]"});
   expect_named(complaints_[1], {"line 3: has 2 cells"});
+  expect_named(complaints_[2], {"line 4: is longer than any frame"});
   EXPECT_EQ(sensor.first_refused(), complaints_[0]);
 }
 

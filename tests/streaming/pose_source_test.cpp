@@ -217,12 +217,13 @@ TEST_F(PoseFifo, EveryKindOfFaultIsSaidOnceAndAClockThatIsSetBackRefusesNoLine) 
             line(time_s, 1.0) + line(time_s - 30.0, 1.0) + line(time_of(i + 1) + back_s, 1.0);
   }
   tell(text);
-  ASSERT_EQ(complaints_.size(), 5u);
+  ASSERT_EQ(complaints_.size(), 6u);
   expect_named(complaints_[0], {"line 6", "clock"});
   expect_named(complaints_[1], {"line 16", "JSON"});
-  expect_named(complaints_[2], {"line 18", "'x_mm'"});
-  expect_named(complaints_[3], {"line 19", "1.7e+308"});
-  expect_named(complaints_[4], {"line 21", "not later", "1699992770.1 s", "1699992800.1 s"});
+  expect_named(complaints_[2], {"line 17", "longer"});
+  expect_named(complaints_[3], {"line 18", "'x_mm'"});
+  expect_named(complaints_[4], {"line 19", "1.7e+308"});
+  expect_named(complaints_[5], {"line 21", "not later", "1699992770.1 s", "1699992800.1 s"});
   EXPECT_EQ("poses " + sensor_->poses().first_refused, complaints_[1]);
   EXPECT_EQ(sensor_->poses().refused, 15u);
   EXPECT_EQ(sensor_->poses().set_back, 2u);

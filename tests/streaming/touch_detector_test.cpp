@@ -231,14 +231,10 @@ TEST(TouchDetector, ThatWasMovedFromSaysSo) {
   EXPECT_THROW(first.add({}), Error);  // NOLINT(bugprone-use-after-move): on purpose
 }
 
-SensorDescription two_elements() {
-  SensorDescription sensor;
-  sensor.elements_mm = {{0.0, 0.0}, {1.0, 0.0}};
-  return sensor;
-}
+const SensorDescription two_elements{.name = "", .elements_mm = {{0.0, 0.0}, {1.0, 0.0}}};
 
 TEST(Baseline, IsTheMedianOfEveryElementThatIsNotDead) {
-  SensorDescription sensor = two_elements();
+  SensorDescription sensor = two_elements;
   sensor.elements_mm.emplace_back(2.0, 0.0);
   sensor.valid = {1, 1, 0};
   std::vector<Frame> frames = PressStream{.noise = 0.7}.frames(1.0, [](double t) {
@@ -256,23 +252,23 @@ TEST(Baseline, RefusesATouchedArrayAndNothingToGoBy) {
   auto frames = PressStream{}.frames(1.0, [](double t) {
     return std::vector<double>{3.0, 3.0 + 5.0 * press(t, 0.3, 10.0)};
   });
-  expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }),
+  expect_named(input_error([&] { baseline_of(frames, two_elements, 2.0); }),
                {"touched", "element 1", "kPa"});
   // Unknown readings tell nothing either way.
   for (std::size_t i = 0; i < frames.size(); i += 2) {
     frames[i].values = {infinity, nan};
   }
-  expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }),
+  expect_named(input_error([&] { baseline_of(frames, two_elements, 2.0); }),
                {"touched", "element 1"});
   // Without a pressure that is a touch there is none. Five standard errors of the median, 1.25 *
   // 0.3 / sqrt(50).
-  EXPECT_NEAR(baseline_of(frames, two_elements(), {})[0], 3.0, 0.27);
+  EXPECT_NEAR(baseline_of(frames, two_elements, {})[0], 3.0, 0.27);
   frames[7].values = {1.0};
-  expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }),
+  expect_named(input_error([&] { baseline_of(frames, two_elements, 2.0); }),
                {"1 values", "2 elements"});
-  expect_named(input_error([] { baseline_of({}, two_elements(), 2.0); }), {"no frame"});
+  expect_named(input_error([] { baseline_of({}, two_elements, 2.0); }), {"no frame"});
   frames.assign(5, {.values = {nan, 1.0}});
-  expect_named(input_error([&] { baseline_of(frames, two_elements(), 2.0); }), {"element 0"});
+  expect_named(input_error([&] { baseline_of(frames, two_elements, 2.0); }), {"element 0"});
 }
 
 }  // namespace palpate::touch_detector_test

@@ -54,10 +54,10 @@ TEST(Wts, PassesOverOtherPacketsAndCountsFramesOfAnotherMatrix) {
 
 TEST(Wts, TellsTheTimeOfTheBoard) {
   Receiver receiver(read_serial_profile("wts"));
-  Bytes payload(5 + 168, 0);
-  payload[0] = 0x39;  // 0x00003039 = 12345 ms
-  payload[1] = 0x30;
-  receiver.push(wts_packet(0x00, payload));
+  Bytes packet{0xaa, 0xaa, 0xaa, 0x00, 0xad, 0x00, 0x39, 0x30};  // 0x00003039 = 12345 ms
+  packet.resize(6 + 5 + 168);
+  packet.insert(packet.end(), {0xf1, 0x72});  // the checksum, by another program
+  receiver.push(packet);
   EXPECT_DOUBLE_EQ(receiver.frames().at(0).device_time_s.value(), 12.345);
 }
 
@@ -70,9 +70,8 @@ TEST(Wts, CommandsCarryRightChecksums) {
 
 /// A FlexiTac frame of zeros except for these bytes of the payload.
 Bytes flexitac(std::initializer_list<std::pair<std::size_t, std::uint8_t>> set) {
-  Bytes bytes(514, 0);
-  bytes[0] = 0xaa;
-  bytes[1] = 0x55;
+  Bytes bytes{0xaa, 0x55};
+  bytes.resize(514);
   for (const auto& [at, value] : set) {
     bytes[2 + at] = value;
   }
@@ -126,9 +125,8 @@ TEST(AnySkin, PassesOnWhatIsNoNumber) {
   for (const Bytes& pattern : {Bytes{0x00, 0x00, 0x80, 0x7f}, Bytes{0x00, 0x00, 0x80, 0xff},
                                Bytes{0x01, 0x00, 0xc0, 0xff}}) {
     Bytes damaged = frame.bytes;
-    constexpr std::size_t bytes_of_chip = 16;
     constexpr std::size_t chip = 2;
-    std::ranges::copy(pattern, damaged.begin() + chip * bytes_of_chip + 12);
+    std::ranges::copy(pattern, damaged.begin() + chip * 16 + 12);
     Receiver receiver(read_serial_profile("anyskin"));
     receiver.push(damaged);
     receiver.send({frame});
@@ -142,8 +140,9 @@ TEST(AnySkin, PassesOnWhatIsNoNumber) {
   }
 }
 
-/// A packet of a TSF-85 that holds this content.
-Bytes tsf85_packet(const Bytes& content) {
+/// A packet of a TSF-85 that holds this content, and other bytes behind it.
+Bytes tsf85_packet(Bytes content, const Bytes& rest = {}) {
+  content.insert(content.end(), rest.begin(), rest.end());
   Bytes packet{0x9a, 0x00, 0x58, static_cast<std::uint8_t>(content.size())};
   packet.insert(packet.end(), content.begin(), content.end());
   return packet;
@@ -155,8 +154,7 @@ Bytes finger(int index, std::uint8_t value, const Bytes& rest = {}) {
   for (int i = 0; i < 28; ++i) {
     content.insert(content.end(), {0x00, value});
   }
-  content.insert(content.end(), rest.begin(), rest.end());
-  return tsf85_packet(content);
+  return tsf85_packet(content, rest);
 }
 
 /// A packet of the board's clock, and of other bytes behind it.
@@ -165,8 +163,7 @@ Bytes clock(std::uint64_t ticks, const Bytes& rest = {}) {
   for (int shift = 56; shift >= 0; shift -= 8) {
     content.push_back(static_cast<std::uint8_t>(ticks >> shift));
   }
-  content.insert(content.end(), rest.begin(), rest.end());
-  return tsf85_packet(content);
+  return tsf85_packet(content, rest);
 }
 
 struct FingersCase {
@@ -254,10 +251,7 @@ TEST(OwnBoard, OfTheDocumentsWorksAsPrinted) {
   for (int cell = 0; cell < 16; ++cell) {
     packet.insert(packet.end(), {static_cast<std::uint8_t>(20 * cell), 0x00});
   }
-  const Checksum checksum{.bytes = 2, .polynomial = 0x1021, .init = 0xffff};
-  const std::uint32_t sum = checksum.of(std::span(packet).subspan(2));
-  packet.insert(packet.end(),
-                {static_cast<std::uint8_t>(sum >> 8), static_cast<std::uint8_t>(sum)});
+  packet.insert(packet.end(), {0x62, 0x69});  // the checksum, by another program
   receiver.push(packet);
   ASSERT_EQ(receiver.frames().size(), 1u);
   EXPECT_DOUBLE_EQ(receiver.frames()[0].device_time_s.value(), 1.0);

@@ -7,7 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "driver/packet_format.hpp"
 #include "driver/serial_profile.hpp"
 #include "driver/without_memory.hpp"
 #include "receiver.hpp"
@@ -92,7 +91,7 @@ TEST_P(ShippedBoard, IsInStepTwoFramesAfterDamage) {
     ASSERT_TRUE(receiver.has(sent, 5, 8));
     // Without a checksum, the damaged frame and one more may have wrong values. That of the WTS
     // misses some pairs of flipped bits: the packet's own checksum behind it then leaves 0.
-    const bool is_missed = weiss_checksum(damaged[3].bytes) == 0;
+    const bool is_missed = checksum_of(weiss, damaged[3].bytes) == 0;
     const int wrong = board_ == "wts" ? (is_missed ? 1 : 0) : 2;
     ASSERT_LE(receiver.strangers(sent), between_frames ? 0 : wrong);
     ASSERT_GE(receiver.garbage() - garbage_before, garbage.size());
@@ -171,6 +170,22 @@ TEST(PacketDeframer, ReadsWhatTheProfileSaysAndCountsTheRest) {
   }
 }
 
+TEST(PacketDeframer, FindsTheLargestPacketBehindManyThatBeginLikeIt) {
+  Receiver receiver(parse_serial_profile(
+      "name: largest\nelements: [{grid: [128, 128], pitch_mm: [1, 1]}]\npacket: [bytes: \"00\", "
+      "{values: u8, stride: 3}, {checksum: crc32, polynomial: 0x04c11db7, init: 0xffffffff}]\n",
+      "largest.yaml"));
+  Bytes packet(1 + 3 * 16384, 0);
+  packet[1 + 3 * 16383] = 7;
+  packet.insert(packet.end(), {0x58, 0xb6, 0x21, 0xa2});  // the checksum, by another program
+  receiver.push(Bytes{1});                                // out of step from here on
+  receiver.push(Bytes(1'000'000, 0));
+  receiver.push(packet);
+  ASSERT_EQ(receiver.frames().size(), 1u);
+  EXPECT_EQ(receiver.frames()[0].values.back(), 7.0);
+  EXPECT_EQ(receiver.garbage(), 1'000'001u);
+}
+
 TEST(EndlessGarbage, NeedsNoMoreMemoryThanItsFirstBytes) {
   PacketDeframer deframer(read_serial_profile("wts").packet);
   std::vector<Frame> frames;
@@ -189,15 +204,6 @@ TEST(EndlessGarbage, NeedsNoMoreMemoryThanItsFirstBytes) {
 
 using Kind = Checksum::Kind;
 
-Checksum crc(std::size_t bytes, std::uint32_t polynomial, std::uint32_t init = 0,
-             std::uint32_t xor_out = 0, bool reflect = false) {
-  return {.bytes = bytes,
-          .polynomial = polynomial,
-          .init = init,
-          .xor_out = xor_out,
-          .reflect = reflect};
-}
-
 struct ChecksumCase {
   const char* name;
   std::uint32_t expected;
@@ -211,29 +217,29 @@ constexpr std::string_view three = "\xff\x02\x10";  // 255 + 2 + 16 = 273 = 0x11
 // The values named "check", over "123456789", are those of the catalogue of parametrised CRC
 // algorithms; those of Weiss Robotics, of packets that its command set prints as examples.
 const ChecksumCase cases[] = {
-    {"CRC-8/SMBUS", 0xf4, check, crc(1, 0x07)},
-    {"CRC-8/MAXIM", 0xa1, check, crc(1, 0x31, 0, 0, true)},
-    {"CRC-16/CCITT-FALSE", 0x29b1, check, crc(2, 0x1021, 0xffff)},
-    {"CRC-16/XMODEM", 0x31c3, check, crc(2, 0x1021)},
-    {"CRC-16/MODBUS", 0x4b37, check, crc(2, 0x8005, 0xffff, 0, true)},
+    {"CRC-8/SMBUS", 0xf4, check, {Kind::crc, 1, 0x07}},
+    {"CRC-8/MAXIM", 0xa1, check, {Kind::crc, 1, 0x31, 0, 0, true}},
+    {"CRC-16/CCITT-FALSE", 0x29b1, check, {Kind::crc, 2, 0x1021, 0xffff}},
+    {"CRC-16/XMODEM", 0x31c3, check, {Kind::crc, 2, 0x1021}},
+    {"CRC-16/MODBUS", 0x4b37, check, {Kind::crc, 2, 0x8005, 0xffff, 0, true}},
     // An asymmetric initial value shows whether it is reflected with the register.
-    {"CRC-16/RIELLO", 0x63d0, check, crc(2, 0x1021, 0xb2aa, 0, true)},
-    {"CRC-32/ISO-HDLC", 0xcbf43926, check, crc(4, 0x04c11db7, 0xffffffff, 0xffffffff, true)},
-    {"CRC-32/BZIP2", 0xfc891918, check, crc(4, 0x04c11db7, 0xffffffff, 0xffffffff)},
-    {"Weiss 1", 0x10e8, {"\xaa\xaa\xaa\x01\x00\x00", 6}, {.kind = Kind::weiss, .bytes = 2}},
-    {"Weiss 6", 0x2697, {"\xaa\xaa\xaa\x06\x00\x00", 6}, {.kind = Kind::weiss, .bytes = 2}},
+    {"CRC-16/RIELLO", 0x63d0, check, {Kind::crc, 2, 0x1021, 0xb2aa, 0, true}},
+    {"CRC-32", 0xcbf43926, check, {Kind::crc, 4, 0x04c11db7, 0xffffffff, 0xffffffff, true}},
+    {"CRC-32/BZIP2", 0xfc891918, check, {Kind::crc, 4, 0x04c11db7, 0xffffffff, 0xffffffff}},
+    {"Weiss 1", 0x10e8, {"\xaa\xaa\xaa\x01\x00\x00", 6}, weiss},
+    {"Weiss 6", 0x2697, {"\xaa\xaa\xaa\x06\x00\x00", 6}, weiss},
     {"8-bit sum", 0x11, three, {.kind = Kind::sum, .bytes = 1}},
     {"16-bit sum", 0x111, three, {.kind = Kind::sum, .bytes = 2}},
     {"sum of all", 0xbd, three, {.kind = Kind::sum, .bytes = 1, .init = 0x31, .xor_out = 0xff}},
     {"exclusive or", 0xed, three, {.kind = Kind::exor, .bytes = 1}},
     {"begun", 0xe2, three, {.kind = Kind::exor, .bytes = 1, .init = 0x0f}},
-    {"CRC of nothing", 0xffff, "", crc(2, 0x1021, 0xffff)},
+    {"CRC of nothing", 0xffff, "", {Kind::crc, 2, 0x1021, 0xffff}},
     {"sum of nothing", 0, "", {.kind = Kind::sum, .bytes = 1}}};
 
 TEST(Checksum, GivesThePublishedValues) {
   for (const ChecksumCase& row : cases) {
     const Bytes bytes(row.bytes.begin(), row.bytes.end());
-    EXPECT_EQ(row.checksum.of(bytes), row.expected) << row.name;
+    EXPECT_EQ(checksum_of(row.checksum, bytes), row.expected) << row.name;
   }
 }
 

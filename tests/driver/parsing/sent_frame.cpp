@@ -4,12 +4,13 @@
 #include <bit>
 #include <map>
 
-#include "driver/packet_format.hpp"
-
 namespace palpate {
 
-std::uint32_t weiss_checksum(const Bytes& bytes) {
-  return Checksum{.kind = Checksum::Kind::weiss, .bytes = 2}.of(bytes);
+std::uint32_t checksum_of(const Checksum& checksum, const Bytes& bytes) {
+  RunningChecksum running(checksum);
+  running.push(Bytes{1, 2, 3});
+  running.push(bytes);
+  return running.of(3, 3 + bytes.size());
 }
 
 namespace {
@@ -99,14 +100,11 @@ std::vector<SentFrame> random_frames(const std::string& board, std::size_t count
 }
 
 Bytes wts_packet(std::uint8_t id, const Bytes& payload) {
-  Bytes packet = {0xaa,
-                  0xaa,
-                  0xaa,
-                  id,
-                  static_cast<std::uint8_t>(payload.size()),
-                  static_cast<std::uint8_t>(payload.size() >> 8)};
+  const std::size_t bytes = payload.size();
+  Bytes packet(3, 0xaa);
+  append(packet, {id, static_cast<std::uint8_t>(bytes), static_cast<std::uint8_t>(bytes >> 8)});
   append(packet, payload);
-  const std::uint32_t crc = weiss_checksum(packet);
+  const std::uint32_t crc = checksum_of(weiss, packet);
   append(packet, {static_cast<std::uint8_t>(crc), static_cast<std::uint8_t>(crc >> 8)});
   return packet;
 }

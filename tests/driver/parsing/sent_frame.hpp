@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "driver/packet_format.hpp"
+
 namespace palpate {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -21,8 +23,11 @@ SentFrame random_frame(const std::string& board, std::mt19937& random);
 std::vector<SentFrame> random_frames(const std::string& board, std::size_t count,
                                      std::mt19937& random);
 
+/// The checksum of bytes that come behind others, by the driver.
+std::uint32_t checksum_of(const Checksum& checksum, const Bytes& bytes);
+
 /// Weiss Robotics' checksum; 0 over a packet with its own checksum behind it.
-std::uint32_t weiss_checksum(const Bytes& bytes);
+constexpr Checksum weiss{.kind = Checksum::Kind::weiss, .bytes = 2};
 
 /// A WTS packet, whose checksum is computed so.
 Bytes wts_packet(std::uint8_t id, const Bytes& payload);

@@ -42,10 +42,14 @@ class ProfileFile : public testing::Test {
     return read_serial_profile(path_.string());
   }
 
-  /// Expects that a profile is refused by its path, and by this place in it.
-  void expect_refused(const std::string& yaml, const char* place) {
-    SCOPED_TRACE(yaml);
-    expect_named(input_error([&] { read(yaml); }), {path_.c_str(), place});
+  using Rows = std::initializer_list<std::pair<std::string, const char*>>;
+
+  /// Expects that profiles, each with such a part, are refused by their path and this place in it.
+  void expect_refused(const std::string& before, const Rows& rows, const std::string& behind) {
+    for (const auto& [part, place] : rows) {
+      SCOPED_TRACE(part);
+      expect_named(input_error([&] { read(before + part + behind); }), {path_.c_str(), place});
+    }
   }
 
   ScratchFolder folder_;
@@ -58,7 +62,7 @@ TEST_F(ProfileFile, SaysAllThatItCan) {
   const SerialProfile profile = read(R"(
 name: Own board
 usb: [1209:0001, "1209:ABCD"]
-line: {baud: 921600, data_bits: 7, parity: even, stop_bits: 2}
+line: {baud: 0921600, data_bits: 0x7, parity: even, stop_bits: 2}
 start: 01 02ff
 stop: ""
 unit: kPa
@@ -98,99 +102,88 @@ TEST_F(ProfileFile, NeedsLittle) {
 }
 
 TEST_F(ProfileFile, IsRefusedWhereItIsNone) {
-  const std::filesystem::path missing = folder_ / "no.yaml";
-  for (const std::filesystem::path& path : {missing, folder_.path()}) {
+  for (const std::filesystem::path& path : {folder_ / "no.yaml", folder_.path()}) {
     expect_named(input_error([&] { read_serial_profile(path.string()); }),
-                 {path.c_str(), "no such profile"});
+                 {path.c_str(), "cannot be read as a profile"});
   }
-  const std::pair<std::string, const char*> texts[] = {
-      {"", "line 1: 'the profile': give a map"},
-      {"just text", "line 1: 'the profile' = 'just text': give a map"},
-      {"name: [", "correct the YAML"},
-      {head + packet + "---\nname: other\n", "line 4: a second document"},
-      {"name: own\n", "'elements' is missing"},
-      {head, "'packet' is missing"},
-      {"name: own\nelements: [[0, 0], [1]]\npacket: []\n", "line 2: 'elements[1]': give [x, y]"},
-      {"name: own\nelements: [{grid: [2, 2]}]\npacket: []\n", "line 2: 'elements[0]': a grid has"},
-      {"name: own\nelements: [{grid: [1024, 1024], pitch_mm: [1, 1]}]\npacket: []\n",
-       "'elements[0]': more than 16384"},
-      {"name: own\nelements: []\npacket: []\n", "'elements': give 1 to"}};
-  for (const auto& [text, place] : texts) {
-    expect_refused(text, place);
-  }
+  expect_refused(
+      "",
+      {{"", "line 1: 'the profile': give a map"},
+       {"just text", "line 1: 'the profile' = 'just text': give a map"},
+       {"name: [", "correct the YAML"},
+       {head + packet + "---\nname: other\n", "line 4: a second document"},
+       {"name: own\n", "'elements' is missing"},
+       {head, "'packet' is missing"},
+       {"name: own\nelements: [[0, 0], [1]]\npacket: []\n", "line 2: 'elements[1]': give [x, y]"},
+       {"name: own\nelements: [{grid: [2, 2]}]\npacket: []\n", "line 2: 'elements[0]': a grid has"},
+       {"name: own\nelements: [{grid: [1024, 1024], pitch_mm: [1, 1]}]\npacket: []\n",
+        "'elements[0]': more than 16384"},
+       {"name: own\nelements: []\npacket: []\n", "'elements': give 1 to"}},
+      "");
 }
 
 TEST_F(ProfileFile, IsRefusedByLineAndKey) {
   const HostLocale locale;  // a program's own reads no number that others do not
-  const std::pair<const char*, const char*> lines[] = {
-      {"colour: red", "line 3: 'key' = 'colour': unknown key"},
-      {"name: twice", "line 3: 'key' = 'name': key given twice"},
-      {"usb: [16d0-14cc]", "line 3: 'usb[0]' = '16d0-14cc'"},
-      {"usb: 16d0:14cc", "line 3: 'usb' = '16d0:14cc': give a list"},
-      {"line: {baud: fast}", "line 3: 'baud' = 'fast': give a whole number from 50"},
-      {"line: {baud: 0x+1c200}", "'baud' = '0x+1c200': give a whole number"},
-      {"line: {baud: 0x}", "'baud' = '0x': give a whole number"},
-      {"line: {speed: 9600}", "line 3: 'key' = 'speed': unknown key"},
-      {"line: {parity: mark}", "'parity' = 'mark'"},
-      {"start: 0g", "line 3: 'start' = '0g'"},
-      {"start: 012", "'start' = '012'"},
-      {"unit: psi", "'unit' = 'psi'"},
-      {"gain: .nan", "'gain' = '.nan': give a number"},
-      {"gain: 1,5", "'gain' = '1,5': give a number"},
-      {"rate_hz: -1", "'rate_hz' = '-1'"}};
-  for (const auto& [line, place] : lines) {
-    expect_refused(head + line + "\n" + packet, place);
-  }
+  expect_refused(head,
+                 {{"colour: red", "line 3: 'key' = 'colour': unknown key"},
+                  {"name: twice", "line 3: 'key' = 'name': key given twice"},
+                  {"usb: [16d0-14cc]", "line 3: 'usb[0]' = '16d0-14cc'"},
+                  {"usb: 16d0:14cc", "line 3: 'usb' = '16d0:14cc': give a list"},
+                  {"line: {baud: fast}", "line 3: 'baud' = 'fast': give a whole number from 50"},
+                  {"line: {baud: 0x+1c200}", "'baud' = '0x+1c200': give a whole number"},
+                  {"line: {baud: 0x}", "'baud' = '0x': give a whole number"},
+                  {"line: {speed: 9600}", "line 3: 'key' = 'speed': unknown key"},
+                  {"line: {parity: mark}", "'parity' = 'mark'"},
+                  {"start: 0g", "line 3: 'start' = '0g'"},
+                  {"start: 012", "'start' = '012'"},
+                  {"unit: psi", "'unit' = 'psi'"},
+                  {"gain: .nan", "'gain' = '.nan': give a number"},
+                  {"gain: 1,5", "'gain' = '1,5': give a number"},
+                  {"rate_hz: -1", "'rate_hz' = '-1'"}},
+                 "\n" + packet);
 }
 
 TEST_F(ProfileFile, IsRefusedByTheFieldOfItsPacket) {
-  const std::pair<const char*, const char*> packets[] = {
-      {"bytes: aa", "line 4: 'packet': give exactly one field"},
-      {"values: u8", "'packet': nothing marks a packet"},
-      {"bytes: aa\n  - colour: 3", "line 5: 'packet[1]': unknown field"},
-      {"bytes: aa\n  - {values: u8, colour: 3}", "line 5: 'key' = 'colour': unknown key"},
-      {"bytes: aa\n  - values: u24", "line 5: 'values' = 'u24'"},
-      {"bytes: aa\n  - {values: u16le, stride: 2, at: 1}",
-       "line 5: 'packet[1]': a value at byte 1 does not fit"},
-      {"bytes: aa\n  - length: f32le\n  - values: u8", "line 5: 'length' = 'f32le'"},
-      {"bytes: aa\n  - {length: u8, most: 1}\n  - values: u8",
-       "line 5: 'packet[1]': 'most' is 1, but the values take 2 bytes"},
-      {"bytes: aa\n  - length: u8\n  - bytes: bb\n  - values: u8",
-       "line 6: 'packet[2]': behind 'length', only the end has 'bytes'"},
-      {"bytes: aa\n  - values: u8\n  - length: u8",
-       "line 5: 'packet[1]': put 'values' or 'parts' behind 'length'"},
-      {"bytes: aa\n  - values: u8\n  - checksum: crc16", "line 6: 'packet[2]': a crc needs"},
-      {"bytes: aa\n  - values: u8\n  - {checksum: crc8, polynomial: 0x100}",
-       "line 6: 'packet[2]': shorten polynomial, init and xor_out to 8 bits"},
-      {"bytes: aa\n  - values: u8\n  - {checksum: sum8, from: 3}", "only 3 bytes"},
-      {"bytes: aa\n  - values: u8\n  - {checksum: sum8, covers: after}",
-       "line 6: 'packet[2]': 'covers: after'"},
-      {"bytes: aa\n  - values: u8\n  - checksum: sum8\n  - checksum: sum8",
-       "'packet': give 'length', 'time' and 'checksum' at most once"},
-      {"bytes: aa\n  - length: u8\n  - values: u8\n  - checksum: sum8\n  - skip: 1",
-       "'packet[3]': put 'checksum' before 'length' or at the end"},
-      {"bytes: aa\n  - {parts: u8, tags: [{tag: 1, values: 1}]}",
-       "carry 1 values, but there are 2 elements"},
-      {"bytes: aa\n  - {parts: u8, tags: [{values: 2}]}",
-       "line 5: 'tags[0]': key 'tag' is missing"},
-      {"bytes: aa\n  - {parts: u8, tags: [{tag: 1, values: 2}, {tag: 2, skip: 9}]}",
-       "line 5: 'packet[1]': parts differ in size"},
-      {"bytes: aa\n  - length: u8\n  - {parts: u8, tags: [{tag: 1, values: 2}]}",
-       "line 5: 'packet[1]': add 'most'"},
-      {"bytes: aa\n  - {length: u16le, most: 4097}\n  - {parts: u8, tags: [{tag: 1, values: 2}]}",
-       "line 5: 'packet[1]': 'most' is 4097"}};
-  for (const auto& [fields, place] : packets) {
-    expect_refused(head + "packet:\n  - " + fields + "\n", place);
-  }
+  expect_refused(
+      head + "packet:\n  - ",
+      {{"bytes: aa", "line 4: 'packet': give exactly one field"},
+       {"values: u8", "'packet': nothing marks a packet"},
+       {"bytes: aa\n  - colour: 3", "line 5: 'packet[1]': unknown field"},
+       {"bytes: aa\n  - {values: u8, colour: 3}", "line 5: 'key' = 'colour': unknown key"},
+       {"bytes: aa\n  - values: u24", "line 5: 'values' = 'u24'"},
+       {"bytes: aa\n  - {values: u16le, stride: 2, at: 1}",
+        "line 5: 'packet[1]': a value at byte 1 does not fit"},
+       {"bytes: aa\n  - length: f32le\n  - values: u8", "line 5: 'length' = 'f32le'"},
+       {"bytes: aa\n  - {length: u8, most: 1}\n  - values: u8",
+        "line 5: 'packet[1]': 'most' is 1, but the values take 2 bytes"},
+       {"bytes: aa\n  - length: u8\n  - bytes: bb\n  - values: u8",
+        "line 6: 'packet[2]': behind 'length', only the end has 'bytes'"},
+       {"bytes: aa\n  - values: u8\n  - length: u8",
+        "line 5: 'packet[1]': put 'values' or 'parts' behind 'length'"},
+       {"bytes: aa\n  - values: u8\n  - checksum: crc16", "line 6: 'packet[2]': a crc needs"},
+       {"bytes: aa\n  - values: u8\n  - {checksum: crc8, polynomial: 0x100}",
+        "line 6: 'packet[2]': shorten polynomial, init and xor_out to 8 bits"},
+       {"bytes: aa\n  - values: u8\n  - {checksum: sum8, from: 3}", "only 3 bytes"},
+       {"bytes: aa\n  - values: u8\n  - {checksum: sum8, covers: after}",
+        "line 6: 'packet[2]': 'covers: after'"},
+       {"bytes: aa\n  - values: u8\n  - checksum: sum8\n  - checksum: sum8",
+        "'packet': give 'length', 'time' and 'checksum' at most once"},
+       {"bytes: aa\n  - length: u8\n  - values: u8\n  - checksum: sum8\n  - skip: 1",
+        "'packet[3]': put 'checksum' before 'length' or at the end"},
+       {"bytes: aa\n  - {parts: u8, tags: [{tag: 1, values: 1}]}",
+        "carry 1 values, but there are 2 elements"},
+       {"bytes: aa\n  - {parts: u8, tags: [{values: 2}]}",
+        "line 5: 'tags[0]': key 'tag' is missing"},
+       {"bytes: aa\n  - {parts: u8, tags: [{tag: 1, values: 2}, {tag: 2, skip: 9}]}",
+        "line 5: 'packet[1]': parts differ in size"},
+       {"bytes: aa\n  - length: u8\n  - {parts: u8, tags: [{tag: 1, values: 2}]}",
+        "line 5: 'packet[1]': add 'most'"},
+       {"bytes: aa\n  - {length: u16le, most: 4097}\n  - {parts: u8, tags: [{tag: 1, values: 2}]}",
+        "line 5: 'packet[1]': 'most' is 4097"}},
+      "\n");
   const std::string parts = ", {parts: u8, tags: [{tag: 1, values: 2}]}";
   read(head + "packet: [bytes: aa, {length: u16le, most: 4096}" + parts + "]\n");
   read(head + "packet: [bytes: aa, {length: u16le, most: 65536}" + parts + ", checksum: sum8]\n");
-}
-
-TEST_F(ProfileFile, WholeNumbersAreDecimalOrHexadecimal) {
-  for (const char* number : {"0115200", "0x1c200"}) {
-    EXPECT_EQ(read(head + "line: {baud: " + number + "}\n" + packet).line.baud, 115200u);
-  }
 }
 
 // Lines of the shipped profiles, changed and put together at random.

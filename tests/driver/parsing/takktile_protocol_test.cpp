@@ -130,7 +130,7 @@ class TakkTileFrames : public testing::TestWithParam<std::size_t> {
   std::uint64_t framed_bytes_ = 0;
 };
 
-TEST_P(TakkTileFrames, EndWithAShortOrAnEmptyPacket) {
+TEST_P(TakkTileFrames, EndWithAShortOrAnEmptyPacketAndBeginAnewAfterReset) {
   push({Bytes{}, Bytes{}});
   EXPECT_TRUE(frames_.empty()) << "an empty packet is no frame";
   push(packets_of(cells_, 100));
@@ -139,6 +139,11 @@ TEST_P(TakkTileFrames, EndWithAShortOrAnEmptyPacket) {
   expect_frame(0, 100);
   expect_frame(1, 1000);
   EXPECT_EQ(garbage_bytes_, 0u);
+  push({packets_of(cells_, 9).front().size() == packet_bytes ? Bytes(64, 1) : Bytes{}});
+  deframer_.reset();
+  push(packets_of(cells_, 11));
+  ASSERT_EQ(frames_.size(), 3u);
+  expect_frame(2, 11);
 }
 
 TEST_P(TakkTileFrames, ThatLoseAPacketAreDropped) {
@@ -177,14 +182,6 @@ TEST_P(TakkTileFrames, AreNeverHalfBehindForeignPackets) {
     ASSERT_EQ(garbage_bytes_ + framed_bytes_, pushed_bytes_);
     frames_.clear();
   }
-}
-
-TEST_P(TakkTileFrames, BeginAnewAfterReset) {
-  push({packets_of(cells_, 9).front().size() == packet_bytes ? Bytes(64, 1) : Bytes{}});
-  deframer_.reset();
-  push(packets_of(cells_, 11));
-  ASSERT_EQ(frames_.size(), 1u);
-  expect_frame(0, 11);
 }
 
 // Numbers of cells: one; just below, at and above the 16 of a packet; two packets; a whole board.
