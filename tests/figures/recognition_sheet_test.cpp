@@ -237,7 +237,6 @@ TEST(PlacedBelief, TheWindowHoldsWhatMattersAndNoMoreInFewCells) {
   const PlacedBelief narrow = placed_belief(lattice, hardly);
   EXPECT_LE(narrow.cells * narrow.cell_mm, 8.0);
   EXPECT_NEAR(narrow.cell_mm, 0.5, 1e-12) << "no finer than the lattice";
-
   PoseLattice large = lattice;
   large.x_mm = {-500.0, 500.0, 20000};
   large.y_mm = {-500.0, 500.0, 20000};
