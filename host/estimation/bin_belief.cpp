@@ -28,48 +28,79 @@ void for_runs(std::span<const std::int64_t> grid_bins, const Visit& visit) {
   }
 }
 
-/// Adds the probabilities of a box's bins, exp(log-likelihood - reference + log_scale), to the sums
-/// of the grid's bins in which their centres lie. At one theta these depend on one axis each.
-void add(const BinBox& box, std::span<const double> log_likelihood, double reference,
-         double log_scale, const PoseLattice& from, Marginals& sums) {
-  const double theta_rad = from.theta_rad.centre(box.theta);
-  const glm::dvec2 shift_mm = rotate(theta_rad, sums.grid.pivot_mm - from.pivot_mm);
-  PoseLattice to = sums.grid;
-  to.pivot_mm = {};
-  const auto bin_at = [&](int column, int row) {
-    const glm::dvec2 place_mm(from.x_mm.centre(column), from.y_mm.centre(row));
-    return to.bin_of({place_mm + shift_mm, 0.0});
-  };
-  std::vector<std::int64_t> columns;
-  for (int i = 0; i < box.x_count; ++i) {
-    columns.push_back(bin_at(box.x_first + i, box.y_first) % to.x_mm.count);
-  }
-  std::vector<std::int64_t> rows;  // of a plane: index of their first bins
-  for (int i = 0; i < box.y_count; ++i) {
-    const std::int64_t at = bin_at(box.x_first, box.y_first + i) % to.plane();
-    rows.push_back(at - at % to.x_mm.count);
-  }
-  double all = 0.0;
-  if (log_likelihood.size() == 1) {
-    const double p = std::exp((log_likelihood[0] - reference) + log_scale);
-    for_runs(rows, [&](std::int64_t row, double of_rows) {
-      for_runs(columns, [&](std::int64_t column, double of_columns) {
-        sums.xy[row + column] += p * of_rows * of_columns;
-      });
-    });
-    all = p * static_cast<double>(box.bins());
-  } else {
-    auto log_p = log_likelihood.begin();
-    for (const std::int64_t row : rows) {
-      for (const std::int64_t column : columns) {
-        const double p = std::exp((*log_p++ - reference) + log_scale);
-        sums.xy[row + column] += p;
-        all += p;
-      }
+/// Sums over a grid of the probabilities of a lattice's bins, by where their centres lie. At one
+/// theta the indices of these depend on one axis each; about equal pivots they do at all thetas.
+class GridSums {
+ public:
+  GridSums(const PoseLattice& from, Marginals& sums)
+      : from_(from), sums_(sums), to_(sums.grid), equal_pivots_(from.pivot_mm == to_.pivot_mm) {
+    to_.pivot_mm = {};
+    if (equal_pivots_) {
+      place(whole_plane(from, 0));
     }
   }
-  sums.theta[to.bin_of({{}, theta_rad}) / to.plane()] += all;
-}
+
+  /// Adds exp(log-likelihood - reference + log_scale) of a box's bins.
+  void add(const BinBox& box, std::span<const double> log_likelihood, double reference,
+           double log_scale) {
+    if (!equal_pivots_) {
+      place(box);
+    }
+    const auto part_of = [&](std::span<const std::int64_t> indices, int first, int count) {
+      return indices.subspan(static_cast<std::size_t>(equal_pivots_ ? first : 0),
+                             static_cast<std::size_t>(count));
+    };
+    const std::span columns = part_of(columns_, box.x_first, box.x_count);
+    const std::span rows = part_of(rows_, box.y_first, box.y_count);
+    double all = 0.0;
+    if (log_likelihood.size() == 1) {
+      const double p = std::exp((log_likelihood[0] - reference) + log_scale);
+      for_runs(rows, [&](std::int64_t row, double of_rows) {
+        for_runs(columns, [&](std::int64_t column, double of_columns) {
+          sums_.xy[row + column] += p * of_rows * of_columns;
+        });
+      });
+      all = p * static_cast<double>(box.bins());
+    } else {
+      auto log_p = log_likelihood.begin();
+      for (const std::int64_t row : rows) {
+        for (const std::int64_t column : columns) {
+          const double p = std::exp((*log_p++ - reference) + log_scale);
+          sums_.xy[row + column] += p;
+          all += p;
+        }
+      }
+    }
+    sums_.theta[to_.bin_of({{}, from_.theta_rad.centre(box.theta)}) / to_.plane()] += all;
+  }
+
+ private:
+  /// Finds the columns and rows of a box.
+  void place(const BinBox& box) {
+    const glm::dvec2 shift_mm =
+        rotate(from_.theta_rad.centre(box.theta), sums_.grid.pivot_mm - from_.pivot_mm);
+    const auto bin_at = [&](int column, int row) {
+      const glm::dvec2 place_mm(from_.x_mm.centre(column), from_.y_mm.centre(row));
+      return to_.bin_of({place_mm + shift_mm, 0.0});
+    };
+    columns_.clear();
+    for (int i = 0; i < box.x_count; ++i) {
+      columns_.push_back(bin_at(box.x_first + i, box.y_first) % to_.x_mm.count);
+    }
+    rows_.clear();
+    for (int i = 0; i < box.y_count; ++i) {
+      const std::int64_t at = bin_at(box.x_first, box.y_first + i) % to_.plane();
+      rows_.push_back(at - at % to_.x_mm.count);
+    }
+  }
+
+  const PoseLattice& from_;
+  Marginals& sums_;
+  PoseLattice to_;  ///< the grid about the origin
+  bool equal_pivots_;
+  std::vector<std::int64_t> columns_;
+  std::vector<std::int64_t> rows_;  ///< of a plane: index of their first bins
+};
 
 /// T_object_robot of a pose that is uniform within a bin.
 Pose draw_within(std::int64_t bin, const PoseLattice& lattice, Random& random) {
@@ -105,9 +136,10 @@ Marginals BinBelief::marginals(int object, PoseLattice grid) const {
   if (std::exp(of.log_identity + log_objects) == 0.0) {
     return sums;
   }
+  GridSums on_grid(lattice, sums);
   visit(std::span(&object, 1), {negligible_share},
         [&](const BinBox& box, std::span<const double> log_likelihood) {
-          add(box, log_likelihood, of.reference, log_scale, lattice, sums);
+          on_grid.add(box, log_likelihood, of.reference, log_scale);
         });
   return sums;
 }

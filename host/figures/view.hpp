@@ -9,7 +9,7 @@
 #include <glm/vec2.hpp>
 
 #include "figures/canvas.hpp"
-#include "figures/palette.hpp"
+#include "figures/evidence_scale.hpp"
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/pose.hpp"
 

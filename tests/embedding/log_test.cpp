@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -51,6 +52,18 @@ TEST(Log, TellsWhatADestructorCouldNotThrow) {
     folder.reset();  // the recording cannot be closed there
   }
   log.expect_one(LogLevel::error, "frames.h5");
+}
+
+TEST(Library, PrintsNothing) {
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  Device device = Device::open();
+  const ScratchFolder folder;
+  write_map(folder / "map.h5", letter_maps(device).front().map);
+  std::filesystem::resize_file(folder / "map.h5", 1000);
+  EXPECT_THROW(read_map(folder / "map.h5"), Error);
+  EXPECT_THROW(Device::open("no such device"), Error);
+  EXPECT_EQ(testing::internal::GetCapturedStdout() + testing::internal::GetCapturedStderr(), "");
 }
 
 TEST(LibraryDeathTest, AMessageOfValidationEndsTheProgramAndIsLogged) {

@@ -52,12 +52,11 @@ TEST(BrokenOffUpdate, LeavesABeliefThatSaysSo) {
 
 // Asked on purpose, each of them. NOLINTBEGIN(bugprone-use-after-move)
 TEST(MovedFrom, FiltersMapBuildersAndDevicesSaySo) {
-  Device device = Device::open();
   const Recording recording = random_recording(2, 36, 178);
   const Touch touch = recording.touch(0);
   const std::vector<Hypothesis> objects = three_objects();
 
-  PoseHistogram histogram(device, objects, {.lattice = small_lattice()});
+  PoseHistogram histogram(shared_device(), objects, {.lattice = small_lattice()});
   histogram.update(touch);
   const auto told = told_by(histogram);
   PoseHistogram second(std::move(histogram));
@@ -70,7 +69,7 @@ TEST(MovedFrom, FiltersMapBuildersAndDevicesSaySo) {
   histogram = std::move(second);
   EXPECT_EQ(told_by(histogram), told);
 
-  ParticleFilter filter(device, objects, {.particles = 10});
+  ParticleFilter filter(shared_device(), objects, {.particles = 10});
   const ParticleFilter other(std::move(filter));
   expect_refused({[&] { filter.reset(); }, [&] { filter.update(touch); },
                   [&] { filter.estimate(); }, [&] { filter.effective_sample_size(); },
@@ -78,7 +77,7 @@ TEST(MovedFrom, FiltersMapBuildersAndDevicesSaySo) {
                  "particle filter: was moved from");
   EXPECT_EQ(other.particles().size(), 10U);
 
-  MapBuilder builder(device, {});
+  MapBuilder builder(shared_device(), {});
   const MapBuilder another(std::move(builder));
   expect_refused({[&] { builder.add(all_touches(recording)); }, [&] { builder.build("made up"); },
                   [&] { builder.clear(); }},
@@ -98,11 +97,11 @@ PoseLattice lattice_about(const glm::dvec2& pivot_mm) {
   return lattice;
 }
 
-PoseHistogram make(PoseHistogram*, Device& device, const glm::dvec2& pivot_mm) {
-  return {device, three_objects(), {.lattice = lattice_about(pivot_mm)}};
+PoseHistogram make(PoseHistogram*, const glm::dvec2& pivot_mm) {
+  return {shared_device(), three_objects(), {.lattice = lattice_about(pivot_mm)}};
 }
-ParticleFilter make(ParticleFilter*, Device& device, const glm::dvec2& pivot_mm) {
-  return {device, three_objects(), {.particles = 500, .region = lattice_about(pivot_mm)}};
+ParticleFilter make(ParticleFilter*, const glm::dvec2& pivot_mm) {
+  return {shared_device(), three_objects(), {.particles = 500, .region = lattice_about(pivot_mm)}};
 }
 
 template <class Filter>
@@ -115,8 +114,7 @@ TYPED_TEST(MovedPivot, MakesAFilterWhatItIsWithThePivotFromTheStart) {
   const glm::dvec2 pivot_mm{400.0, 200.0};
   const Recording recording = moved(random_recording(3, 36, 183), {pivot_mm, 0.0});
   const std::vector<Touch> touches = all_touches(recording);
-  Device device = Device::open();
-  TypeParam filter = make(kind, device, {0.0, 0.0});
+  TypeParam filter = make(kind, {0.0, 0.0});
   filter.update(touches);  // about another pivot, which nothing may be left of
   const auto before = told_by(filter);
   expect_named(input_error([&] { filter.move_pivot(pivot_mm); }), {"reset()"});
@@ -129,7 +127,7 @@ TYPED_TEST(MovedPivot, MakesAFilterWhatItIsWithThePivotFromTheStart) {
   EXPECT_EQ(told_by(filter), before) << "over a reset and where it is refused";
   filter.reset();
   filter.move_pivot(pivot_mm);
-  TypeParam built = make(kind, device, pivot_mm);
+  TypeParam built = make(kind, pivot_mm);
   for (int round = 0; round < 2; ++round) {
     filter.update(touches);
     built.update(touches);

@@ -8,6 +8,7 @@
 #include "gpu/context.hpp"
 #include "palpate/particle_filter.hpp"
 #include "palpate/pose_histogram.hpp"
+#include "support/shared_device.hpp"
 #include "support/synthetic.hpp"
 
 namespace palpate {

@@ -20,10 +20,9 @@ namespace palpate::none_test {
 class NoneOfThese : public testing::Test {
  protected:
   PoseHistogram histogram_of(std::optional<double> none_weight) {
-    return {device, objects, {.lattice = small_lattice(), .none_weight = none_weight}};
+    return {shared_device(), objects, {.lattice = small_lattice(), .none_weight = none_weight}};
   }
 
-  Device device = Device::open();
   const std::vector<Hypothesis> objects{{random_map(31, 27, 0.5, 1.0, 151), 1.5},
                                         {random_map(25, 25, 0.5, 1.0, 152), 0.5}};
   const Recording recording = random_recording(3, 36, 165);
@@ -75,7 +74,7 @@ TEST_F(NoneOfThese, IsNamedWhereTheObjectsNumbersLieFarApart) {
   ContactModel contact = random_table(2);
   std::vector<double>& numbers = contact.table->log_likelihood;
   std::fill_n(numbers.begin(), numbers.size() / 2, -800.0);
-  PoseHistogram histogram(device, objects,
+  PoseHistogram histogram(shared_device(), objects,
                           {.lattice = small_lattice(), .contact = contact, .none_weight = 1.0});
   histogram.update(recording.touch(0));
   const Estimate estimate = histogram.estimate();
@@ -99,10 +98,9 @@ TEST(Contradiction, IsSaidWhereNothingExplainsTheTouches) {
   recording.elements_mm = {{-1, 0}, {1, 0}};
   recording.T_robot_sensor = {{}};
   HistogramOptions options{.lattice = small_lattice(), .none_weight = 1.0};
-  Device device = Device::open();
   for (const double gamma : {0.0, 0.1}) {
     options.contact.gamma = gamma;
-    PoseHistogram histogram(device, sure_objects(), options);
+    PoseHistogram histogram(shared_device(), sure_objects(), options);
     EXPECT_FALSE(histogram.estimate().contradicted) << "before any touch";
     // Half of the elements in contact, half not: neither full nor empty.
     recording.pressure = {9.0, 0.0};
@@ -134,7 +132,6 @@ double prior_over_best(const ParticleFilter& filter, const Touch& touch,
 }
 
 TEST(Contradiction, IsSaidByParticlesWhereTheReferenceSaysSo) {
-  Device device = Device::open();
   const Recording recording = random_recording(8, 36, 158);
   const auto said = [&](double steepness, double gamma) {
     // So wide that no particle leaves its elements on what was never seen.
@@ -142,7 +139,7 @@ TEST(Contradiction, IsSaidByParticlesWhereTheReferenceSaysSo) {
                                           {random_map(121, 121, 0.5, steepness, 160), 1.0}};
     ParticleOptions options{.particles = 500, .region = {}};
     options.contact.gamma = gamma;
-    ParticleFilter filter(device, objects, options);
+    ParticleFilter filter(shared_device(), objects, options);
     EXPECT_FALSE(filter.estimate().contradicted) << "before any touch";
     double nats = 0.0;
     int contradicted = 0;

@@ -17,14 +17,13 @@
 namespace palpate::refusal_test {
 
 TEST(MapOptions, OutOfRangeAreRefused) {
-  Device device = Device::open();
   std::vector<std::pair<MapOptions, const char*>> wrong{
       {{.classifier = {.threshold = nan}}, "threshold"}, {{.sensor = {.peak = 1e-7}}, "peak"}};
   for (const double length : {0.0, -0.5, nan, infinity, 1e-7, 1.1e6, 1e154, 1e200}) {
     wrong.push_back({{.cell_mm = length}, "cell"});
   }
   for (const auto& [options, name] : wrong) {
-    expect_named(input_error([&] { const MapBuilder builder(device, options); }), {name});
+    expect_named(input_error([&] { MapBuilder(shared_device(), options); }), {name});
   }
 }
 
@@ -52,21 +51,19 @@ TEST(FilterInput, OutOfRangeIsRefused) {
   for (const double weight : {0.0, -1.0, nan, infinity}) {
     wrong.emplace_back("weight", [=](Input& in) { in.objects[0].weight = weight; });
   }
-  Device device = Device::open();
   for (const auto& [name, change] : wrong) {
     SCOPED_TRACE(name);
     Input in;
     change(in);
     const HistogramOptions bins{.lattice = in.lattice, .contact = in.contact};
-    expect_named(input_error([&] { const PoseHistogram made(device, in.objects, bins); }), {name});
+    expect_named(input_error([&] { PoseHistogram(shared_device(), in.objects, bins); }), {name});
     const ParticleOptions particles{.particles = 10, .region = in.lattice, .contact = in.contact};
-    expect_named(input_error([&] { const ParticleFilter made(device, in.objects, particles); }),
+    expect_named(input_error([&] { ParticleFilter(shared_device(), in.objects, particles); }),
                  {name});
   }
 }
 
 TEST(HistogramOptions, OutOfRangeAreRefused) {
-  Device device = Device::open();
   std::vector<Hypothesis> objects = three_objects();
   std::vector<std::pair<HistogramOptions, const char*>> wrong{
       {{.lattice = {.x_mm = {-10.0, 10.0, 0}}}, "x_mm"},
@@ -77,15 +74,15 @@ TEST(HistogramOptions, OutOfRangeAreRefused) {
     wrong.push_back({{.lattice = {}, .none_weight = weight}, "none_weight"});
   }
   for (const auto& [options, name] : wrong) {
-    expect_named(input_error([&] { const PoseHistogram made(device, objects, options); }), {name});
+    expect_named(input_error([&] { PoseHistogram(shared_device(), objects, options); }), {name});
   }
   objects[0].map.prior = 0.3;
-  EXPECT_NO_THROW(PoseHistogram(device, objects, {.lattice = {}, .contact = {.prior = 0.25}}))
+  EXPECT_NO_THROW(
+      PoseHistogram(shared_device(), objects, {.lattice = {}, .contact = {.prior = 0.25}}))
       << "maps of several priors, where one is given";
 }
 
 TEST(ParticleOptions, OutOfRangeAreRefused) {
-  Device device = Device::open();
   std::vector<std::pair<ParticleOptions, const char*>> wrong{
       {{.region = {}, .alpha_fast = 1.1}, "alpha_fast = "},
       {{.region = {.y_mm = {0.0, 2e5, 1}}}, "region y_mm = "}};
@@ -100,7 +97,7 @@ TEST(ParticleOptions, OutOfRangeAreRefused) {
     wrong.push_back({{.region = {}, .alpha_slow = rate}, "alpha_slow = "});
   }
   for (const auto& [options, name] : wrong) {
-    expect_named(input_error([&] { const ParticleFilter made(device, three_objects(), options); }),
+    expect_named(input_error([&] { ParticleFilter(shared_device(), three_objects(), options); }),
                  {name});
   }
 }

@@ -166,6 +166,7 @@ int choice(std::vector<Candidate>& candidates, std::string_view wish = {}) {
     if (candidate.info.chosen) {
       EXPECT_EQ(found, -1) << "two are chosen";
       found = candidate.info.index;
+      EXPECT_EQ(chosen(candidates, wish).info.index, found);
     }
   }
   return found;

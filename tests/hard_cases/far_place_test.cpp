@@ -41,7 +41,7 @@ std::vector<FarCase> far_cases() {
   return cases;
 }
 
-TEST(FarPlace, IsAsGoodAsTheOrigin) {
+TEST(FarPlace, AgreesWithFloat64) {
   const std::vector<Hypothesis> objects = two_objects();
   for (const auto& [name, lattice, recording] : far_cases()) {
     HardCase hard(name);

@@ -74,7 +74,7 @@ void HardCase::check(const std::string& quantity, double error, double allowed) 
 void HardCase::expect(const std::string& quantity, double error, double allowed) {
   check(quantity, error, allowed);
   Largest& largest = largest_[quantity];
-  if (error > largest.error || largest.allowed == 0.0) {
+  if (error * largest.allowed >= largest.error * allowed) {
     largest = {error, allowed};
   }
 }

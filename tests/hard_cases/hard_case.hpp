@@ -40,7 +40,7 @@ class HardCase {
   HardCase(const HardCase&) = delete;
   HardCase& operator=(const HardCase&) = delete;
 
-  /// Expects the error to be allowed, and keeps each quantity's largest error.
+  /// Expects the error to be allowed, and keeps each quantity's largest, of what is allowed.
   void expect(const std::string& quantity, double error, double allowed);
 
   /// Runs a histogram over the touches, so many times, and expects finite results that agree with

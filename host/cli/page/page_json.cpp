@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "figures/evidence_scale.hpp"
 #include "figures/palette.hpp"
 
 namespace palpate::cli {

@@ -106,7 +106,7 @@ std::uint64_t BoundedBelief::bytes() const {
   for (const KnownElements& touch : elements_.touches) {
     bytes += touch.undisplaced_bins->bytes();
   }
-  return bytes + (found_ ? found_->bins.bytes() : 0);
+  return bytes + (none_ ? none_->bytes() : 0) + (found_ ? found_->bins.bytes() : 0);
 }
 
 std::vector<double> BoundedBelief::log_likelihood(std::span<const BinBox> boxes,
@@ -203,8 +203,12 @@ BinBelief BoundedBelief::bins() {
                 .objects = {},
                 .visit = [this](std::span<const int> objects, const BlockChoice& /*all*/,
                                 const BinVisitor& visitor) {
+                  std::vector<std::uint8_t> asked(hypotheses_.size());
+                  for (const int object : objects) {
+                    asked[object] = 1;
+                  }
                   visit([&](const BinBox& box, std::span<const double> log_likelihood) {
-                    if (std::ranges::find(objects, box.object) != objects.end()) {
+                    if (asked[box.object] != 0) {
                       visitor(box, log_likelihood);
                     }
                   });

@@ -91,8 +91,14 @@ std::vector<ProbabilityInterval> identity_bounds(std::span<const double> identit
 }  // namespace
 
 struct BoundedPosterior::Impl : BoundedBelief {
-  using BoundedBelief::BoundedBelief;
+  Impl(std::span<const Hypothesis> objects, const BoundedOptions& checked_options)
+      : BoundedBelief(objects, checked_options) {
+    for (const Hypothesis& object : objects) {
+      bodies.push_back(displaced_body(object.map));
+    }
+  }
 
+  std::vector<Body> bodies;                    ///< [hypothesis]
   std::optional<PredictedReadings> predicted;  ///< once a gain is asked for
   OwnProcess process;
 };
@@ -174,7 +180,7 @@ Estimate BoundedPosterior::estimate(std::optional<double> tolerance) const {
 }
 
 RefinedPose BoundedPosterior::refine(const Mode& mode) const {
-  const BoundedBelief& belief = with_touches_taken_in();
+  const Impl& belief = with_touches_taken_in();
   require_object(mode.object, belief.hypotheses().size());
   // Where bins are very fine, a few of them tell the peak, and all would take long. A mean over
   // displacements takes the others all the same.
@@ -190,7 +196,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   const BinLikelihood& likelihood = of_fit ? *of_fit : belief.likelihood();
   return palpate::refine(
       [&](std::span<const BinBox> boxes) { return belief.log_likelihood(boxes, likelihood); }, fit,
-      displaced_body(belief.hypotheses()[mode.object].map), start);
+      belief.bodies[mode.object], start);
 }
 
 Marginals BoundedPosterior::marginals(int object) const { return marginals(object, lattice()); }

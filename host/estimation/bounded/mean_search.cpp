@@ -146,7 +146,7 @@ class MeanSearch::Division {
     const Plane plane = this->plane(theta);
     LogSum left_out;
     std::vector<Batch> batches = largest_batches(plane);
-    for (std::size_t level = 0; level < levels_.size(); ++level) {
+    for (std::size_t level = 0; level < levels_.size() && !batches.empty(); ++level) {
       const bool finest = level + 1 == levels_.size();
       const double of_level = finest ? least + closer_nats : least;
       const double room = std::floor((unpenalised_[level] - of_level) * penalties_per_nat);
@@ -222,9 +222,13 @@ class MeanSearch::Division {
   }
   std::vector<Batch> largest_batches(const Plane& plane) {
     std::vector<Batch> batches;
+    const TileRange& tiles = plane.largest;
+    if (tiles.x_first >= tiles.x_end || tiles.y_first >= tiles.y_end) {
+      return batches;
+    }
     place(0, plane);
-    for (int y = plane.largest.y_first; y < plane.largest.y_end; y += batch_side) {
-      for (int x = plane.largest.x_first; x < plane.largest.x_end; x += batch_side) {
+    for (int y = tiles.y_first; y < tiles.y_end; y += batch_side) {
+      for (int x = tiles.x_first; x < tiles.x_end; x += batch_side) {
         batches.push_back(batch(0, x, y));
       }
     }

@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include <glm/vec2.hpp>
+
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/bounded/search/search_space.hpp"
 #include "estimation/known_elements.hpp"
@@ -42,6 +44,11 @@ class MeanSearch {
   std::optional<LogInterval> bounds(double least, const Deadline& deadline);
   /// Log of the share of the bins that count among all, by prior weight; 0 before bounds().
   double log_share() const { return log_share_; }
+  /// Host memory of what is kept of planes and elements, in bytes.
+  std::uint64_t bytes() const {
+    return surveys_.capacity() * sizeof(Survey) + reaches_.capacity() * sizeof(BoundingBox) +
+           elements_.from_pivot_mm.capacity() * sizeof(glm::dvec2);
+  }
 
  private:
   class Division;

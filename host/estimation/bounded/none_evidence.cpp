@@ -53,6 +53,14 @@ void NoneEvidence::add(std::span<const TouchEvidence> touches) {
   std::ranges::move(added, std::back_inserter(means_));
 }
 
+std::uint64_t NoneEvidence::bytes() const {
+  std::uint64_t bytes = 0;
+  for (const TouchMean& mean : means_) {
+    bytes += mean.search.bytes() + mean.found.capacity() * sizeof(LogInterval);
+  }
+  return bytes;
+}
+
 bool NoneEvidence::search(TouchMean& mean, const Deadline& deadline) {
   const LogInterval last = mean.found.back();
   const std::size_t before = mean.found.size() - 1;  // searches

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <vector>
@@ -44,6 +45,8 @@ class NoneEvidence {
   /// bits do not depend on their number.
   /// @throws what the deadline's cancel point throws
   LogInterval bounds(const Enough& enough, const Deadline& deadline);
+  /// Host memory of what is kept of the touches, in bytes.
+  std::uint64_t bytes() const;
 
  private:
   /// What is known of one touch.

@@ -220,6 +220,8 @@ void MapBuilder::Impl::grow(const CellRange& needed) {
 }
 
 void MapBuilder::Impl::flush() {
+  // Once for all passes: to grow copies all cells, and a sensor that moves would grow with each.
+  grow(range_of(seen));
   const double radius = radius_mm(seen);
   const double cell_mm = options.cell_mm;
   const double tiles_across = 2.0 + 2.0 * radius / (cell_mm * shaders::TILE_CELLS);
@@ -232,12 +234,6 @@ void MapBuilder::Impl::flush() {
   for (std::span<const ElementReading> readings = pending; !readings.empty();
        readings = readings.subspan(std::min(pass, readings.size()))) {
     const auto part = readings.first(std::min(pass, readings.size()));
-    BoundingBox box;
-    for (const ElementReading& r : part) {
-      box.take_in(r.position_mm);
-    }
-    grow(cover(box.lower, box.upper, radius, cell_mm));
-
     const TileLists lists = assign_to_tiles(part, range, cell_mm, radius, options.sensor);
     if (lists.tiles.empty()) {
       continue;  // every reading falls between the centres of cells larger than its support

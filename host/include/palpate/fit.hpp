@@ -95,9 +95,9 @@ PALPATE_API FitScale pooled(std::span<const FitScale> objects);
 /// over No Contact and In Contact at every level. With L(r) = log P(r | l), mean M and variance V
 /// of L(r) under q, and sums over the known elements of all touches,
 ///   z = sum (L(reading) - M) / sqrt(sum V).
-/// Elements count as independent; Unknown elements do not count.
+/// Elements count as independent; Unknown elements do not count. So z is where `touch_sd` is zero.
 ///
-/// By `touch_sd` each touch may have been displaced by itself: the sensor really was at
+/// Where it is not, each touch may have been displaced by itself: the sensor really was at
 /// T_robot_sensor * delta, delta normally distributed. L is then a touch's log-likelihood
 /// averaged over delta, log E P(readings), and M and V are its mean and variance over touches of
 /// the object: delta drawn first, then each element's reading from q at that place. With sums over
@@ -107,6 +107,8 @@ PALPATE_API FitScale pooled(std::span<const FitScale> objects);
 /// leaves z uncertain by about 0.1; the seed is fixed.
 /// @param T_object_robot pose of the robot frame in the object frame
 /// @param contact its prior is the map's where it has none
+/// @param touch_sd standard deviations of the sensor's pose at each touch, along x and y in mm and
+/// of theta in rad; by default none
 /// @param object index of the object whose numbers of a table are used
 /// @returns none where no element is known
 /// @throws Error on a touch that is not sound, or a table without numbers for the object

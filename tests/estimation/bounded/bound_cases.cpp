@@ -6,6 +6,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "support/shared_device.hpp"
 #include "support/touched_shape.hpp"
 
 namespace palpate {
@@ -214,9 +215,8 @@ HistogramOptions dense_options(const BoundedOptions& options) {
           .touch_sd = options.touch_sd};
 }
 
-BothFilters::BothFilters(Device& device, const std::vector<Hypothesis>& objects,
-                         const BoundedOptions& options)
-    : bounded(objects, options), dense(device, objects, dense_options(options)) {}
+BothFilters::BothFilters(const std::vector<Hypothesis>& objects, const BoundedOptions& options)
+    : bounded(objects, options), dense(shared_device(), objects, dense_options(options)) {}
 
 void BothFilters::update(const Touch& touch) {
   bounded.update(touch);

@@ -106,8 +106,7 @@ HistogramOptions dense_options(const BoundedOptions& options);
 
 /// A posterior by bounds, and a histogram of the same bins.
 struct BothFilters {
-  BothFilters(Device& device, const std::vector<Hypothesis>& objects,
-              const BoundedOptions& options);
+  BothFilters(const std::vector<Hypothesis>& objects, const BoundedOptions& options);
   void update(const Touch& touch);
 
   BoundedPosterior bounded;

@@ -225,14 +225,13 @@ LikelihoodTable three_levels() {
 }
 
 TEST(BoundedGain, IsThatOfTheHistogram) {
-  Device device = Device::open();
   BoundedOptions learned = small_options();
   learned.contact.table = three_levels();
   learned.none_weight = 2.0;
   for (const auto& [name, options] : {std::pair{"exact", small_options()},
                                       {"uncertain", uncertain_options()},
                                       {"learned", learned}}) {
-    BothFilters both(device, two_alike(), options);
+    BothFilters both(two_alike(), options);
     both.update(touches_of_l(2, 861).touch(0));
     both.bounded.estimate();  // as a plan asks first
     const std::vector<double> ours = gains_of(both.bounded);

@@ -125,8 +125,7 @@ void expect_same_pose(const RefinedPose& ours, const RefinedPose& theirs) {
 
 TEST_P(BoundedLaws, TellWhatFloat64LeavesOutAsTheHistogramDoes) {
   const auto& [name, objects, options, recording] = GetParam();
-  Device device = Device::open();
-  BothFilters both(device, objects, options);
+  BothFilters both(objects, options);
   for (std::size_t n = 0; n <= recording.size(); ++n) {
     SCOPED_TRACE(testing::Message() << n << " touches");
     if (n > 0) {

@@ -12,12 +12,23 @@
 #include <gtest/gtest.h>
 
 #include "bound_cases.hpp"
+#include "estimation/bounded/bounded_belief.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 #include "estimation/known_elements.hpp"
 #include "palpate/bounded_posterior.hpp"
 #include "support/certified.hpp"
 
 namespace palpate::evaluated_bins_test {
+
+TEST(EvaluatedBins, AreKeptAsLongAsThereIsRoom) {
+  EvaluatedBins bins;
+  for (int i = 0; i < 10; ++i) {  // 80 MiB hold ten times 8 MB
+    bins.add({.y_count = 1000, .x_count = 1000}, std::vector<double>(1'000'000));
+  }
+  EXPECT_TRUE(bins.complete());
+  EXPECT_GE(bins.bytes(), 80'000'000U);
+  EXPECT_LE(bins.bytes(), std::uint64_t{160} << 20);
+}
 
 TEST(EvaluatedBins, BeyondTheirMemoryAreSearchedForAgain) {
   // 12 million bins, nearly all of which matter after one touch of three elements.

@@ -229,10 +229,15 @@ double none_width(const Estimate& estimate) {
 
 TEST(BoundedNone, AndTheMarginalsOfAllObjectsAreTheWhole) {
   BoundedPosterior posterior(two_shapes(), with_none(2.0));
-  posterior.update(all_touches(touches_of_l(4, 816)));
-  EXPECT_NEAR(
-      posterior.estimate().none + sum(posterior.marginals(0).xy) + sum(posterior.marginals(1).xy),
-      1.0, 1e-12);
+  BoundedPosterior without(two_shapes(), small_options());
+  for (BoundedPosterior* each : {&posterior, &without}) {
+    each->update(all_touches(touches_of_l(4, 816)));
+    EXPECT_NEAR(each->estimate().none + sum(each->marginals(0).xy) + sum(each->marginals(1).xy),
+                1.0, 1e-12);
+  }
+  // Of each touch, every object and theta has at least some numbers.
+  EXPECT_GT(posterior.host_bytes(),
+            without.host_bytes() + std::size_t{4 * 2 * 16} * sizeof(double));
 }
 
 TEST(BoundedNone, IsBoundedAsCloselyAsTheEvidenceAndWithin0_3Nats) {

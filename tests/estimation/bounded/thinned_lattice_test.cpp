@@ -50,7 +50,6 @@ TEST(ThinnedLattice, ItsCentresAreCentresOfTheLattice) {
 
 TEST(ThinnedLattice, RefinedPosesLieInTheRegion) {
   const Recording recording = touches_of_l(5, 832);
-  Device device = Device::open();
   Uniform uniform(833);
   const auto axis = [&](double middle, double widest) {
     const double width = widest * std::pow(10.0, uniform(-3.5, 0.0));
@@ -63,7 +62,7 @@ TEST(ThinnedLattice, RefinedPosesLieInTheRegion) {
         .x_mm = axis(1.3, 10.0),
         .y_mm = axis(-0.8, 10.0),
         .theta_rad = trial % 4 == 3 ? Axis{-1.0, -1.0 + two_pi, 2 * trial} : axis(0.7, 5.0)};
-    BothFilters both(device, {two_shapes()[0]}, {.lattice = region});
+    BothFilters both({two_shapes()[0]}, {.lattice = region});
     for (const Touch& touch : all_touches(recording)) {
       both.update(touch);
     }

@@ -146,8 +146,7 @@ class TouchedGain : public testing::Test {
   const PoseLattice lattice{
       .x_mm = {-2.0, 2.0, 4}, .y_mm = {0.5, 0.5, 1}, .theta_rad = {0.3, 0.3, 1}};
   const std::vector<Hypothesis> objects = three_objects();
-  Device device = Device::open();
-  PoseHistogram histogram{device, objects, {.lattice = lattice, .contact = contact}};
+  PoseHistogram histogram{shared_device(), objects, {.lattice = lattice, .contact = contact}};
 };
 
 TEST_F(TouchedGain, OfAHistogramIsThatOfItsBins) {

@@ -12,13 +12,8 @@ namespace palpate::pose_histogram_test {
 
 class PoseHistogramTest : public testing::Test {
  protected:
-  static PoseHistogram histogram_of(Device& device) {
-    return {device, three_objects(), {.lattice = small_lattice()}};
-  }
-
-  Device device = Device::open();
-  PoseHistogram one = histogram_of(device);
-  PoseHistogram other = histogram_of(device);
+  PoseHistogram one{shared_device(), three_objects(), {.lattice = small_lattice()}};
+  PoseHistogram other{shared_device(), three_objects(), {.lattice = small_lattice()}};
 };
 
 TEST_F(PoseHistogramTest, StartsUniformAndReturnsToIt) {
@@ -61,7 +56,7 @@ TEST_F(PoseHistogramTest, UnknownElementsAndTouchesChangeNoBit) {
 TEST_F(PoseHistogramTest, ADimensionOfZeroExtentCostsOneBin) {
   HistogramOptions options;
   options.lattice = {.x_mm = {1.0, 1.0, 25}, .y_mm = {-5, 5, 7}, .theta_rad = {0.5, 0.5, 16}};
-  const PoseHistogram histogram(device, three_objects(), options);
+  const PoseHistogram histogram(shared_device(), three_objects(), options);
   EXPECT_EQ(histogram.lattice().bins(), 7);
   EXPECT_EQ(histogram.log_likelihood(0).size(), 7U);
   const Pose pose = histogram.estimate().mode.T_object_robot;
@@ -76,7 +71,7 @@ TEST_F(PoseHistogramTest, OnlyListedObjectsCostMemory) {
   options.lattice.y_mm.count = 64;
   const Recording recording = random_recording(2, 36, 101);
   const auto bytes = [&](std::span<const Hypothesis> listed) {
-    PoseHistogram histogram(device, listed, options);
+    PoseHistogram histogram(shared_device(), listed, options);
     histogram.update(all_touches(recording));
     return histogram.device_bytes();
   };
@@ -90,10 +85,9 @@ TEST_F(PoseHistogramTest, OnlyListedObjectsCostMemory) {
 }
 
 TEST(PoseHistogram, DrawsLieWhereTheirPartsOfTheBeliefDo) {
-  Device device = Device::open();
   PoseLattice lattice = small_lattice();  // of so many bins that most blocks have no draw
   lattice.x_mm.count = lattice.y_mm.count = lattice.theta_rad.count = 60;
-  PoseHistogram histogram(device, three_objects(), {.lattice = lattice});
+  PoseHistogram histogram(shared_device(), three_objects(), {.lattice = lattice});
   histogram.update(all_touches(random_recording(1, 36, 98)));
   constexpr std::uint64_t seed = 99;
   constexpr std::size_t count = 5;

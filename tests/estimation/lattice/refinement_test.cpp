@@ -16,6 +16,7 @@
 #include "palpate/error.hpp"
 #include "palpate/pose_histogram.hpp"
 #include "support/limits.hpp"
+#include "support/shared_device.hpp"
 #include "support/synthetic.hpp"
 #include "support/touched_shape.hpp"
 
@@ -144,8 +145,7 @@ TEST_P(Refinement, HasTheGoldenPosesAndCovariances) {
       moved(letter ? touches_of(on_letter_l, {{0.3, -0.2}, 0.8}, letter_touches, 7)
                    : random_recording(2, 36, 132),
             {lattice.pivot_mm, 0.0});
-  Device device = Device::open();
-  PoseHistogram histogram(device, std::span(&object, 1), {.lattice = lattice});
+  PoseHistogram histogram(shared_device(), std::span(&object, 1), {.lattice = lattice});
   histogram.update(all_touches(recording));
   const reference::Posterior expected =
       reference_posterior(std::span(&object, 1), {.lattice = lattice}, all_touches(recording));
@@ -284,8 +284,7 @@ TEST(RefinedPose, OfAFullCircleLiesOnItWhereverItBegins) {
 
 TEST(RefinedPose, OfWhatIsNotThereIsRefused) {
   const Hypothesis object{random_map(5, 4, 0.5, 1.0, 139), 1.0};
-  Device device = Device::open();
-  const PoseHistogram histogram(device, std::span(&object, 1), {});
+  const PoseHistogram histogram(shared_device(), std::span(&object, 1), {});
   for (const Mode& mode :
        {Mode{.object = 1}, Mode{.object = -1}, Mode{.bin = -1},
         Mode{.bin = histogram.lattice().bins()}, Mode{.T_object_robot = {{nan, 0.0}, 0.0}}}) {

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "gpu/command_stream.hpp"
-#include "palpate/device.hpp"
 #include "philox_words.hpp"
+#include "support/shared_device.hpp"
 
 namespace palpate::philox_test {
 
@@ -18,8 +18,7 @@ struct Input {
 };
 
 std::vector<Words> on_device(std::span<const Input> inputs) {
-  Device device = Device::open();
-  gpu::Context& context = device.context();
+  gpu::Context& context = shared_device().context();
   const gpu::Kernel kernel(context, {.name = "philox_words",
                                      .spirv = shaders::philox_words,
                                      .bindings = {gpu::Access::storage, gpu::Access::storage},

@@ -16,6 +16,7 @@ namespace palpate {
 /// gives upper bounds of the means. Both are logs, [run, block, y, x], in nats; -infinity where a
 /// place holds no bin.
 struct DisplacementMean {
+  /// @param place_bins bins of a place along each axis: those of a tile for bounds(), 1 for means()
   DisplacementMean(const DisplacementWeights& weights, int place_bins);
 
   /// Bounds for tiles, in float32 arithmetic and rounded up.
