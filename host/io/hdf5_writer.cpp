@@ -1,7 +1,6 @@
 #include "io/hdf5_writer.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 #include <numeric>
 
@@ -18,55 +17,23 @@ static_assert(sizeof(Pose) == 3 * sizeof(double) && sizeof(glm::dvec2) == 2 * si
 
 namespace {
 
-// Callbacks by which HDF5 manages a file's memory.
+// Callbacks by which HDF5 leaves a file's memory to its writer.
 
-void* allocate(std::size_t size, H5FD_file_image_op_t, void* image) {
-  static_cast<Hdf5Image*>(image)->capacity = size;
-  return std::calloc(1, size);
-}
-
-void* copy(void* to, const void* from, std::size_t size, H5FD_file_image_op_t, void*) {
-  return std::memcpy(to, from, size);
-}
-
-void* grow(void* memory, std::size_t needed, H5FD_file_image_op_t, void* user) {
-  auto& image = *static_cast<Hdf5Image*>(user);
-  if (memory == nullptr) {
-    image.capacity = 0;  // HDF5 first loads a file of its name that lies in the working folder
-  }
-  if (needed <= image.capacity) {
-    return memory;
-  }
-  const std::size_t size = std::max(needed, image.expected);
-  char* grown = static_cast<char*>(std::realloc(memory, size));
-  if (grown != nullptr) {
-    // Zeros, so that the same content gives the same bytes.
-    std::memset(grown + image.capacity, 0, size - image.capacity);
-    image.capacity = size;
-  }
-  return grown;
-}
-
-herr_t take(void* memory, H5FD_file_image_op_t operation, void* user) {
-  auto& image = *static_cast<Hdf5Image*>(user);
-  if (operation == H5FD_FILE_IMAGE_OP_FILE_CLOSE) {
-    image.bytes.reset(static_cast<char*>(memory));
-  } else {
-    std::free(memory);
-  }
+herr_t take(void* memory, H5FD_file_image_op_t, void* bytes) {
+  static_cast<Hdf5Bytes*>(bytes)->reset(static_cast<char*>(memory));
   return 0;
 }
 
-void* share(void* image) { return image; }
+void* share(void* bytes) { return bytes; }
 
 herr_t keep(void*) { return 0; }
 
-// Makes a file that lives in memory; closing it leaves its bytes to `image`.
-Hdf5Handle file_in_memory(Hdf5Image& image, Hdf5Writer::Layout layout) {
+// Makes a file that lives in memory; closing it leaves its bytes to `bytes`.
+Hdf5Handle file_in_memory(Hdf5Bytes& bytes, Hdf5Writer::Layout layout, std::size_t expected) {
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   constexpr std::size_t growth = 1 << 20;
-  H5FD_file_image_callbacks_t callbacks{allocate, copy, grow, take, share, keep, &image};
-  H5Pset_fapl_core(access.get(), growth, false);
+  H5FD_file_image_callbacks_t callbacks{nullptr, nullptr, nullptr, take, share, keep, &bytes};
+  H5Pset_fapl_core(access.get(), std::max(growth, expected), false);
   H5Pset_file_image_callbacks(access.get(), &callbacks);
   if (layout == Hdf5Writer::Layout::appendable) {
     set_appendable(access.get());
@@ -123,9 +90,7 @@ void set_appendable(hid_t access) {
 }
 
 Hdf5Writer::Hdf5Writer(std::filesystem::path path, Layout layout, std::size_t expected_bytes)
-    : path_(std::move(path)),
-      image_{.expected = expected_bytes},
-      file_(file_in_memory(image_, layout)) {
+    : path_(std::move(path)), file_(file_in_memory(bytes_, layout, expected_bytes)) {
   require(file_.valid(), "the file");
 }
 
@@ -183,8 +148,8 @@ void Hdf5Writer::save(const std::function<void(const std::filesystem::path&)>& f
   require(H5Fflush(file_.get(), H5F_SCOPE_GLOBAL) >= 0, "the file");
   const ssize_t size = H5Fget_file_image(file_.get(), nullptr, 0);
   file_ = Hdf5Handle(H5I_INVALID_HID, H5Fclose);
-  require(size > 0 && image_.capacity >= static_cast<std::size_t>(size), "the file");
-  target.write({image_.bytes.get(), static_cast<std::size_t>(size)});
+  require(size > 0 && bytes_ != nullptr, "the file");
+  target.write({bytes_.get(), static_cast<std::size_t>(size)});
   if (finished) {
     finished(target.path());
   }

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -24,14 +23,10 @@ void set_appendable(hid_t access);
 
 /// The bytes of an HDF5 file made in memory. H5Fget_file_image() would not do: HDF5 1.10 spoils a
 /// checksum in the image of a file with SWMR.
-struct Hdf5Image {
-  struct Free {
-    void operator()(char* memory) const { std::free(memory); }
-  };
-  std::unique_ptr<char, Free> bytes;  ///< HDF5's own, once the file is closed
-  std::size_t capacity = 0;           ///< in bytes; free space follows the file's end
-  std::size_t expected = 0;           ///< bytes that are taken at once: growth may copy them all
+struct FreeHdf5Bytes {
+  void operator()(char* bytes) const { H5free_memory(bytes); }
 };
+using Hdf5Bytes = std::unique_ptr<char, FreeHdf5Bytes>;
 
 /// Builds an HDF5 file in memory and saves it in one piece, so that a failing disk is met by
 /// AtomicFile, not in the middle of HDF5's caches. The same content gives the same bytes. Every
@@ -47,7 +42,7 @@ class Hdf5Writer {
   enum class Layout { closed, appendable };
 
   /// @param path target of save(), which is not touched before
-  /// @param expected_bytes of the file, if known
+  /// @param expected_bytes of the file, if known: they are taken at once, as growth may copy them
   explicit Hdf5Writer(std::filesystem::path path, Layout layout = Layout::closed,
                       std::size_t expected_bytes = 0);
   Hdf5Writer(const Hdf5Writer&) = delete;
@@ -93,7 +88,7 @@ class Hdf5Writer {
 
   std::filesystem::path path_;
   Hdf5Session session_;
-  Hdf5Image image_;
+  Hdf5Bytes bytes_;  ///< once the file is closed
   Hdf5Handle file_;  ///< until save()
 };
 

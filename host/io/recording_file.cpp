@@ -264,9 +264,12 @@ void write_recording(const std::filesystem::path& path, const Recording& recordi
   require_rows(path, recording, e, recording, 0);
 
   constexpr std::size_t head = 1 << 16;
-  const std::size_t row =
-      e * (narrow ? sizeof(float) : sizeof(double)) + sizeof(Pose) + sizeof(double);
-  Hdf5Writer file(path, Hdf5Writer::Layout::closed, n * row + head);
+  const std::size_t lists = recording.time_s.size() + recording.baseline.size() +
+                            recording.device_time_s.size() + recording.lost_before.size();
+  Hdf5Writer file(path, Hdf5Writer::Layout::closed,
+                  head + recording.pressure.size() * (narrow ? sizeof(float) : sizeof(double)) +
+                      n * sizeof(Pose) + recording.elements_mm.size() * sizeof(glm::dvec2) +
+                      recording.valid.size() + lists * sizeof(double));
   write_head(file, recording);
   file.dataset("pressure", {n, e}, recording.pressure,
                narrow ? Hdf5Writer::Storage::narrow : Hdf5Writer::Storage::plain);
