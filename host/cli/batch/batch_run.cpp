@@ -6,13 +6,10 @@
 #include <atomic>
 #include <chrono>
 #include <climits>
-#include <condition_variable>
-#include <exception>
 #include <future>
 #include <map>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "cli/options.hpp"
@@ -87,60 +84,42 @@ class Pipeline {
   }
 
   BatchCounts run(const std::function<void(const BatchCounts&)>& progress) {
-    recognisers_left_ = recognisers_;
     read_ahead();
-    std::vector<std::jthread> threads;
-    try {
+    std::vector<std::future<void>> recognisers;  // whose end joins the threads
+    stopping_all_on_failure([&] {
       for (std::size_t i = 0; i < recognisers_; ++i) {
-        threads.emplace_back([this, i] { guard([this, i] { recognise_unknowns(i == 0); }); });
+        recognisers.push_back(std::async(std::launch::async, [this, i] {
+          stopping_all_on_failure([&] { recognise_unknowns(i == 0); });
+        }));
       }
-      tell_until_end(progress);
-    } catch (...) {
-      fail(std::current_exception());
-    }
-    threads.clear();  // joins
-    if (failure_) {
-      std::rethrow_exception(failure_);
-    }
+      for (std::future<void>& recogniser : recognisers) {
+        while (recogniser.wait_for(pause) != std::future_status::ready) {
+          progress(counts());
+        }
+        recogniser.get();
+      }
+      progress(counts());
+    });
     return counts_;
   }
 
  private:
   std::size_t chunk_of(std::size_t unknown) const { return unknown / run_.task.chunk_unknowns; }
 
-  /// Without the mutex: the threads go on where whoever reads the progress does not.
-  void tell_until_end(const std::function<void(const BatchCounts&)>& progress) {
-    for (bool ended = false; !ended;) {
-      std::unique_lock lock(mutex_);
-      ended = ended_.wait_for(lock, pause, [this] { return recognisers_left_ == 0; });
-      const BatchCounts counts = counts_;
-      lock.unlock();
-      progress(counts);
-    }
-  }
-
-  /// The first failure ends all threads.
-  void fail(const std::exception_ptr& failure) {
-    const std::lock_guard lock(mutex_);
-    failure_ = failure_ ? failure_ : failure;
-  }
-  bool failed() {
-    const std::lock_guard lock(mutex_);
-    return failure_ != nullptr;
-  }
-
-  /// Runs the work of a recognising thread.
   template <typename Work>
-  void guard(const Work& work) {
+  void stopping_all_on_failure(const Work& work) {
     try {
       work();
     } catch (...) {
-      fail(std::current_exception());
+      stop_ = true;
+      throw;
     }
+  }
+
+  /// Copied: the threads go on where whoever reads the progress does not.
+  BatchCounts counts() {
     const std::lock_guard lock(mutex_);
-    if (--recognisers_left_ == 0) {
-      ended_.notify_one();
-    }
+    return counts_;
   }
 
   bool is_wanted(std::size_t input) const {
@@ -171,7 +150,7 @@ class Pipeline {
   /// The next unknown that is wanted; none where all are taken or another thread has failed.
   std::optional<Job> next() {
     const std::lock_guard reading(reading_mutex_);
-    while (!failed()) {
+    while (!stop_) {
       std::vector<Query>& unknowns = present_.input.unknowns;
       for (; taken_ < unknowns.size(); ++taken_) {
         if (const std::size_t index = present_.first + taken_; run_.wanted[chunk_of(index)]) {
@@ -260,6 +239,7 @@ class Pipeline {
   std::vector<std::size_t> first_;  ///< [input] index of its first unknown
   std::size_t recognisers_ = 1;
   std::atomic<bool> told_ = false;
+  std::atomic<bool> stop_ = false;  ///< as something has failed
 
   std::mutex reading_mutex_;  ///< of what follows
   std::size_t next_input_ = 0;
@@ -267,10 +247,7 @@ class Pipeline {
   NumberedInput present_;
   std::size_t taken_ = 0;  ///< of its unknowns
 
-  std::mutex mutex_;               ///< of what follows
-  std::condition_variable ended_;  ///< all recognisers
-  std::size_t recognisers_left_ = 0;
-  std::exception_ptr failure_;  ///< the first one
+  std::mutex mutex_;  ///< of what follows
   std::map<std::size_t, OpenChunk> open_;
   BatchCounts counts_;
 };
