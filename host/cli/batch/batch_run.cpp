@@ -10,6 +10,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <ranges>
 #include <utility>
 
 #include "cli/options.hpp"
@@ -33,6 +34,12 @@ struct Job {
   std::size_t index;  ///< among all unknowns
   std::shared_ptr<const Recording> recording;
   Query unknown;
+};
+
+/// An input that has wanted unknowns.
+struct WantedInput {
+  std::size_t first = 0;  ///< index of its first unknown among all
+  const BatchEntry* entry = nullptr;
 };
 
 /// An input that has been read.
@@ -75,10 +82,14 @@ class Pipeline {
  public:
   explicit Pipeline(const BatchRun& run)
       : run_(run), task_(run.job.task()), unknowns_(run.task.unknowns()) {
-    std::size_t at = 0;
+    std::size_t first = 0;
     for (const BatchEntry& entry : run.task.inputs) {
-      first_.push_back(at);
-      at += run.task.unknowns_of(entry);
+      const std::size_t end = first + run.task.unknowns_of(entry);
+      if (std::ranges::any_of(std::views::iota(first, end),
+                              [&](std::size_t unknown) { return run.wanted[chunk_of(unknown)]; })) {
+        inputs_.push_back({first, &entry});
+      }
+      first = end;
     }
     recognisers_ = std::min(most_at_once(task_, run.threads), run.to_be_done);
   }
@@ -122,27 +133,11 @@ class Pipeline {
     return counts_;
   }
 
-  bool is_wanted(std::size_t input) const {
-    const std::size_t first = first_[input];
-    const std::size_t count = run_.task.unknowns_of(run_.task.inputs[input]);
-    for (std::size_t chunk = chunk_of(first); count > 0 && chunk <= chunk_of(first + count - 1);
-         ++chunk) {
-      if (run_.wanted[chunk]) {
-        return true;
-      }
-    }
-    return false;
-  }
-
-  /// Begins to read the next input that has wanted unknowns. libhdf5 reads one file at a time.
+  /// Begins to read the next input. libhdf5 reads one file at a time.
   void read_ahead() {
-    while (next_input_ < first_.size() && !is_wanted(next_input_)) {
-      ++next_input_;
-    }
-    if (next_input_ < first_.size()) {
-      ahead_ = std::async(std::launch::async, [this, input = next_input_++] {
-        return NumberedInput{first_[input],
-                             read_entry(run_.task, run_.task.inputs[input], run_.job.request())};
+    if (next_input_ < inputs_.size()) {
+      ahead_ = std::async(std::launch::async, [this, next = inputs_[next_input_++]] {
+        return NumberedInput{next.first, read_entry(run_.task, *next.entry, run_.job.request())};
       });
     }
   }
@@ -236,7 +231,7 @@ class Pipeline {
   const BatchRun& run_;
   const RecognitionTask& task_;
   const std::size_t unknowns_;
-  std::vector<std::size_t> first_;  ///< [input] index of its first unknown
+  std::vector<WantedInput> inputs_;
   std::size_t recognisers_ = 1;
   std::atomic<bool> told_ = false;
   std::atomic<bool> stop_ = false;  ///< as something has failed
