@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <iterator>
 #include <regex>
 #include <utility>
@@ -24,17 +25,12 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 /// A file with what a page shows of it.
-class ViewedFile {
- public:
-  explicit ViewedFile(fs::path file) : path(std::move(file)) {}
-  virtual ~ViewedFile() = default;
-
-  virtual const char* kind() const = 0;
-  virtual Json overview() const = 0;
+struct ViewedFile {
+  fs::path path;
+  const char* kind;
+  std::string overview;  ///< JSON
   /// A part by its name and number; null where there is none.
-  virtual Json part(const std::string& name, std::size_t index) const = 0;
-
-  const fs::path path;
+  std::function<Json(const std::string& name, std::size_t index)> part;
 };
 
 namespace {
@@ -57,95 +53,81 @@ Json reach_of(std::vector<Pose> poses) {
   return json;
 }
 
-class ViewedRecording : public ViewedFile {
- public:
-  explicit ViewedRecording(const fs::path& location) : ViewedFile(location) {
-    const RecordingFile file(location);
-    recording_ = file.head().recording;
-    elements_ = file.head().elements;
-    pressure_.reserve(file.head().rows * elements_);
-    const auto append = [](auto& list, const auto& more) {
-      list.insert(list.end(), more.begin(), more.end());
-    };
-    ReadingHistogram readings;
-    Recording some;
-    const std::uint64_t at_once = std::max<std::uint64_t>(1, (1 << 19) / elements_);
-    for (std::uint64_t first = 0; first < file.head().rows; first += at_once) {
-      file.read(first, std::min(at_once, file.head().rows - first), some);
-      append(pressure_, some.pressure);
-      append(recording_.T_robot_sensor, some.T_robot_sensor);
-      append(recording_.time_s, some.time_s);
-      if (recording_.elements_mm.empty()) {  // a changing array is drawn as it begins
-        append(recording_.elements_mm, std::span(some.elements_mm).first(elements_));
-      }
-      for (const double value : some.pressure) {
-        if (value > 0.0 && value < 1e30) {  // one reading of 1e38 shall not be the scale
-          readings.add(value);
-          shows_pressure_ = true;
-        }
-      }
-    }
-    largest_ = shows_pressure_ ? readings.quantile(0.999) : 0.0;
+/// Some rows; null beyond the last.
+/// @param pressure [n, e]
+Json rows_json(const Recording& recording, std::span<const float> pressure, std::size_t first) {
+  if (first >= recording.size()) {
+    return nullptr;
   }
-
-  const char* kind() const override { return "recording"; }
-
-  Json overview() const override {
-    const std::vector<std::uint8_t>& valid = recording_.valid;
-    Json json{{"rows", recording_.rows},
-              {"count", recording_.size()},
-              {"object", recording_.object},
-              {"pressure_unit", recording_.pressure_unit},
-              {"elements_mm", places_json(recording_.elements_mm)},
-              {"reach", reach_of(recording_.T_robot_sensor)},
-              {"valid", std::span(valid).first(valid.size() >= elements_ ? elements_ : 0)}};
-    if (shows_pressure_) {
-      json["largest"] = largest_;
+  const std::size_t elements = pressure.size() / recording.size();
+  Json json{{"first", first}, {"pressure", Json::array()}, {"pose", Json::array()}};
+  const std::size_t last = std::min(recording.size(), first + rows_at_once);
+  for (std::size_t i = first; i < last; ++i) {
+    const std::span row = pressure.subspan(i * elements, elements);
+    json["pressure"].push_back(pressure_json(std::vector<double>(row.begin(), row.end())));
+    json["pose"].push_back(pose_json(recording.T_robot_sensor[i]));  // NaN becomes null
+    if (!recording.time_s.empty()) {
+      json["time"].push_back(recording.time_s[i]);
     }
-    if (!recording_.time_s.empty()) {
-      json["begin_s"] = recording_.time_s.front();
-    }
-    return json;
   }
+  return json;
+}
 
-  Json part(const std::string& name, std::size_t first) const override {
-    if (name != "rows" || first >= recording_.size()) {
-      return nullptr;
+ViewedFile view_recording(const fs::path& path) {
+  const RecordingFile file(path);
+  const std::size_t elements = file.head().elements;
+  Recording recording = file.head().recording;  // whose pressures stay out of it
+  std::vector<float> pressure;                  // four digits are shown, which float holds
+  pressure.reserve(file.head().rows * elements);
+  const auto append = [](auto& list, const auto& more) {
+    list.insert(list.end(), more.begin(), more.end());
+  };
+  bool shows_pressure = false;
+  ReadingHistogram readings;
+  Recording some;
+  const std::uint64_t at_once = std::max<std::uint64_t>(1, (1 << 19) / elements);
+  for (std::uint64_t first = 0; first < file.head().rows; first += at_once) {
+    file.read(first, std::min(at_once, file.head().rows - first), some);
+    append(pressure, some.pressure);
+    append(recording.T_robot_sensor, some.T_robot_sensor);
+    append(recording.time_s, some.time_s);
+    if (recording.elements_mm.empty()) {  // a changing array is drawn as it begins
+      append(recording.elements_mm, std::span(some.elements_mm).first(elements));
     }
-    Json json{{"first", first}, {"pressure", Json::array()}, {"pose", Json::array()}};
-    const std::size_t last = std::min(recording_.size(), first + rows_at_once);
-    for (std::size_t i = first; i < last; ++i) {
-      const auto row = pressure_.begin() + static_cast<std::ptrdiff_t>(i * elements_);
-      json["pressure"].push_back(
-          pressure_json(std::vector<double>(row, row + static_cast<std::ptrdiff_t>(elements_))));
-      json["pose"].push_back(pose_json(recording_.T_robot_sensor[i]));  // NaN becomes null
-      if (!recording_.time_s.empty()) {
-        json["time"].push_back(recording_.time_s[i]);
+    for (const double value : some.pressure) {
+      if (value > 0.0 && value < 1e30) {  // one reading of 1e38 shall not be the scale
+        readings.add(value);
+        shows_pressure = true;
       }
     }
-    return json;
   }
+  const std::vector<std::uint8_t>& valid = recording.valid;
+  Json overview{{"kind", "recording"},
+                {"rows", recording.rows},
+                {"count", recording.size()},
+                {"object", recording.object},
+                {"pressure_unit", recording.pressure_unit},
+                {"elements_mm", places_json(recording.elements_mm)},
+                {"reach", reach_of(recording.T_robot_sensor)},
+                {"valid", std::span(valid).first(valid.size() >= elements ? elements : 0)}};
+  if (shows_pressure) {
+    overview["largest"] = readings.quantile(0.999);
+  }
+  if (!recording.time_s.empty()) {
+    overview["begin_s"] = recording.time_s.front();
+  }
+  return {path, "recording", text_of(overview),
+          [recording = std::move(recording), pressure = std::move(pressure)](
+              const std::string& name, std::size_t first) {
+            return name == "rows" ? rows_json(recording, pressure, first) : nullptr;
+          }};
+}
 
- private:
-  Recording recording_;  ///< without pressures
-  std::size_t elements_ = 0;
-  /// [n, e]; four digits are shown, so float holds them.
-  std::vector<float> pressure_;
-  bool shows_pressure_ = false;
-  double largest_ = 0.0;  ///< of the pressures but for the last in a thousand
-};
-
-class ViewedMap : public ViewedFile {
- public:
-  explicit ViewedMap(const fs::path& file) : ViewedFile(file), map_(read_map(file)) {}
-
-  const char* kind() const override { return "map"; }
-  Json overview() const override { return map_json(map_); }
-  Json part(const std::string& /*name*/, std::size_t /*index*/) const override { return nullptr; }
-
- private:
-  OccupancyGrid map_;
-};
+ViewedFile view_map(const fs::path& path) {
+  Json overview{{"kind", "map"}};
+  overview.update(map_json(read_map(path)));
+  return {path, "map", text_of(overview), [](const auto&...) { return Json(); }};
+}
 
 /// What stands behind a pointer such as "/mode/map"; null where there is nothing.
 Json value_at(const nlohmann::json& record, const std::string& pointer) {
@@ -163,39 +145,11 @@ bool is_live(const nlohmann::json& record) {
   return value_at(record, "/unknown").is_number() && value_at(record, "/touch").is_number();
 }
 
-class ViewedRecords : public ViewedFile {
- public:
-  explicit ViewedRecords(const fs::path& results) : ViewedFile(results) {
-    for (const fs::path& file : result_files(std::vector<std::string>{results.string()})) {
-      std::vector<nlohmann::json> lines;  // of the unknown that live told of last
-      for (nlohmann::json& record : records_in(file)) {
-        if (!is_live(record)) {
-          add(record);
-        } else if (!record.contains("next")) {
-          if (!lines.empty() && lines.back()["unknown"] != record["unknown"]) {
-            add_unknown(std::exchange(lines, {}));
-          }
-          lines.push_back(std::move(record));
-        } else if (!lines.empty()) {
-          lines.back()["next"] = record["next"];
-        }
-      }
-      add_unknown(lines);
-    }
-  }
+/// Results as they are read.
+struct ViewedRecords {
+  std::vector<std::string> records;  ///< JSON of each
+  Json rows = Json::array();
 
-  const char* kind() const override { return "records"; }
-  Json overview() const override { return {{"rows", rows_}}; }
-
-  Json part(const std::string& name, std::size_t index) const override {
-    if (index >= records_.size()) {
-      return nullptr;
-    }
-    const auto record = nlohmann::json::parse(records_[index]);
-    return name == "record" ? Json(record) : name == "map" ? map_of(record) : nullptr;
-  }
-
- private:
   void add(const nlohmann::json& record) {
     const std::string best = text_at(record, "/best");
     const std::string error = text_at(record, "/error");
@@ -203,13 +157,13 @@ class ViewedRecords : public ViewedFile {
     const std::string frame =
         record.contains("frame") ? " frame " + record["frame"].dump() : std::string();
     const Json identity = value_at(record, "/identity");
-    rows_.push_back(Json::array(
+    rows.push_back(Json::array(
         {text_at(record, "/recording") + frame, touches.is_null() ? Json(0) : touches,
          error.empty() ? best : error, identity.contains(best) ? identity[best] : Json(),
          value_at(record, "/truth/object"),
          value_at(record, record.contains("refined_error_mm") ? "/refined_error_mm" : "/error_mm"),
          value_at(record, "/fit/verdict"), value_at(record, "/decision/act")}));
-    records_.push_back(text_of(record));
+    records.push_back(text_of(record));
   }
 
   /// Adds an unknown of `live`: its last line, with all of them as its trace.
@@ -222,40 +176,67 @@ class ViewedRecords : public ViewedFile {
       add(record);
     }
   }
+};
 
-  Json map_of(const nlohmann::json& record) const {
-    // Relative to where recognize ran, which may be where this runs, or beside the results.
-    const fs::path named = text_at(record, "/mode/map");
-    for (const fs::path& file : {named, path.parent_path() / named}) {
-      try {
-        const OccupancyGrid map = read_map(file);
-        return map_json(value_at(record, "/mode/mirrored") == true ? mirror_image(map) : map);
-      } catch (const Error&) {
-        // A map that is elsewhere now is not shown.
+/// @param results the file or folder that the record stands in
+Json map_of(const nlohmann::json& record, const fs::path& results) {
+  // Relative to where recognize ran, which may be where this runs, or beside the results.
+  const fs::path named = text_at(record, "/mode/map");
+  for (const fs::path& file : {named, results.parent_path() / named}) {
+    try {
+      const OccupancyGrid map = read_map(file);
+      return map_json(value_at(record, "/mode/mirrored") == true ? mirror_image(map) : map);
+    } catch (const Error&) {
+      // A map that is elsewhere now is not shown.
+    }
+  }
+  return nullptr;
+}
+
+ViewedFile view_records(const fs::path& path) {
+  ViewedRecords viewed;
+  for (const fs::path& file : result_files(std::vector<std::string>{path.string()})) {
+    std::vector<nlohmann::json> lines;  // of the unknown that live told of last
+    for (nlohmann::json& record : records_in(file)) {
+      if (!is_live(record)) {
+        viewed.add(record);
+      } else if (!record.contains("next")) {
+        if (!lines.empty() && lines.back()["unknown"] != record["unknown"]) {
+          viewed.add_unknown(std::exchange(lines, {}));
+        }
+        lines.push_back(std::move(record));
+      } else if (!lines.empty()) {
+        lines.back()["next"] = record["next"];
       }
     }
-    return nullptr;
+    viewed.add_unknown(lines);
   }
-
-  std::vector<std::string> records_;  ///< JSON of each
-  Json rows_ = Json::array();
-};
+  return {path, "records", text_of(Json{{"kind", "records"}, {"rows", viewed.rows}}),
+          [path, records = std::move(viewed.records)](const std::string& name,
+                                                      std::size_t index) -> Json {
+            if (index >= records.size()) {
+              return nullptr;
+            }
+            const auto record = nlohmann::json::parse(records[index]);
+            return name == "record" ? Json(record) : name == "map" ? map_of(record, path) : nullptr;
+          }};
+}
 
 bool is_hdf5(const fs::path& path) {
   return path.extension() == ".h5" || path.extension() == ".hdf5";
 }
 
-std::unique_ptr<const ViewedFile> open_file(const fs::path& path) {
+ViewedFile view_file(const fs::path& path) {
   if (!is_hdf5(path)) {
-    return std::make_unique<ViewedRecords>(path);
+    return view_records(path);
   }
   require_readable(path);
   const std::string format = read_format(path);
   if (format == "palpate.recording") {
-    return std::make_unique<ViewedRecording>(path);
+    return view_recording(path);
   }
   if (format == "palpate.map") {
-    return std::make_unique<ViewedMap>(path);
+    return view_map(path);
   }
   refuse(path,
          "attribute 'format' = '{}'; give recordings, maps or results of recognize, live or batch",
@@ -268,7 +249,7 @@ ViewedFiles::ViewedFiles(std::span<const std::string> paths) {
   for (const std::string& path : paths) {
     std::error_code error;
     if (!fs::is_directory(path, error) || fs::exists(fs::path(path) / "task.ndjson", error)) {
-      files_.push_back(open_file(path));
+      files_.push_back(view_file(path));
       continue;
     }
     std::vector<fs::path> inside = paths_in(path);
@@ -278,7 +259,7 @@ ViewedFiles::ViewedFiles(std::span<const std::string> paths) {
     if (inside.empty()) {
       refuse(path, "a folder without *.h5 or *.json; give recordings, maps or results");
     }
-    std::ranges::transform(inside, std::back_inserter(files_), open_file);
+    std::ranges::transform(inside, std::back_inserter(files_), view_file);
   }
 }
 
@@ -286,8 +267,8 @@ ViewedFiles::~ViewedFiles() = default;
 
 std::string ViewedFiles::list() const {
   auto json = Json::array();
-  for (const auto& file : files_) {
-    json.push_back({{"name", file->path.string()}, {"kind", file->kind()}});
+  for (const ViewedFile& file : files_) {
+    json.push_back({{"name", file.path.string()}, {"kind", file.kind}});
   }
   return text_of(json);
 }
@@ -298,14 +279,12 @@ std::optional<std::string> ViewedFiles::get(const std::string& path) const {
   if (!std::regex_match(path, asked, form) || std::stoul(asked[1]) >= files_.size()) {
     return {};
   }
-  const ViewedFile& file = *files_[std::stoul(asked[1])];
-  if (asked[2].matched) {
-    const Json part = file.part(asked[3], std::stoul(asked[4]));
-    return part.is_null() ? std::nullopt : std::optional(text_of(part));
+  const ViewedFile& file = files_[std::stoul(asked[1])];
+  if (!asked[2].matched) {
+    return file.overview;
   }
-  Json json{{"kind", file.kind()}};
-  json.update(file.overview());
-  return text_of(json);
+  const Json part = file.part(asked[3], std::stoul(asked[4]));
+  return part.is_null() ? std::nullopt : std::optional(text_of(part));
 }
 
 }  // namespace palpate::cli

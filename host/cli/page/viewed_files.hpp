@@ -1,6 +1,5 @@
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -8,7 +7,7 @@
 
 namespace palpate::cli {
 
-class ViewedFile;
+struct ViewedFile;
 
 /// Saved files, for a page to look at: recordings, maps, and what `recognize --json`, `live --json`
 /// and `batch` wrote.
@@ -30,7 +29,7 @@ class ViewedFiles {
   std::optional<std::string> get(const std::string& path) const;
 
  private:
-  std::vector<std::unique_ptr<const ViewedFile>> files_;
+  std::vector<ViewedFile> files_;
 };
 
 }  // namespace palpate::cli
