@@ -1,8 +1,8 @@
 #include "figures/placed_belief.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstdint>
 
 #include "model/bounding_box.hpp"
 
@@ -15,30 +15,22 @@ constexpr double shown = 1e-4;    ///< of the likeliest bin's share
 constexpr int cells_across = 160;
 constexpr double least_window_mm = 4.0;
 
-/// Indices of a bin along x, y and theta.
-using AxisIndices = std::array<int, 3>;
-
-AxisIndices indices_of(const PoseLattice& lattice, std::int64_t bin) {
-  const std::int64_t row = bin / lattice.x_mm.count;
-  return {static_cast<int>(bin % lattice.x_mm.count), static_cast<int>(row % lattice.y_mm.count),
-          static_cast<int>(row / lattice.y_mm.count)};
-}
-
 /// Calls see(p_mm, share) with the origin of T_robot_object at the bin's centre, or of each of its
 /// parts at theirs.
 template <typename See>
 void for_parts(const PoseLattice& lattice, const BinShare& bin, const See& see) {
-  const AxisIndices at = indices_of(lattice, bin.bin);
-  const auto place = [](const Axis& axis, int i, int part) {
-    return axis.centre(i) + part * axis.step() / 3.0;
+  const std::int64_t row = bin.bin / lattice.x_mm.count;
+  const auto place = [](const Axis& axis, std::int64_t i, int part) {
+    return axis.centre(static_cast<int>(i)) + part * axis.step() / 3.0;
   };
   const int reach = bin.share < divided ? 0 : 1;
   for (int w = -reach; w <= reach; ++w) {
     for (int v = -reach; v <= reach; ++v) {
       for (int u = -reach; u <= reach; ++u) {
         const Pose T_object_robot =
-            lattice.T_object_robot(place(lattice.x_mm, at[0], u), place(lattice.y_mm, at[1], v),
-                                   place(lattice.theta_rad, at[2], w));
+            lattice.T_object_robot(place(lattice.x_mm, bin.bin % lattice.x_mm.count, u),
+                                   place(lattice.y_mm, row % lattice.y_mm.count, v),
+                                   place(lattice.theta_rad, row / lattice.y_mm.count, w));
         see(inverse(T_object_robot).translation_mm, reach == 0 ? bin.share : bin.share / 27.0);
       }
     }
@@ -72,7 +64,7 @@ PlacedBelief placed_belief(const PoseLattice& lattice, std::span<const BinShare>
   };
   std::vector<double> turns(static_cast<std::size_t>(lattice.theta_rad.count), 0.0);
   for (const BinShare& bin : bins) {
-    turns[static_cast<std::size_t>(indices_of(lattice, bin.bin)[2])] += bin.share;
+    turns[static_cast<std::size_t>(bin.bin / lattice.plane())] += bin.share;
     for_parts(lattice, bin, add);
   }
   for (int k = 0; k < lattice.theta_rad.count; ++k) {
