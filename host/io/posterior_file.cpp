@@ -1,9 +1,7 @@
-#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <span>
-#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

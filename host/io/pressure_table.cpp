@@ -1,7 +1,6 @@
 #include "io/pressure_table.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>

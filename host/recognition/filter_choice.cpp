@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 #include <tuple>
-#include <utility>
 
 #include <fmt/format.h>
 

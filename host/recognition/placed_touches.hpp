@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <span>
-#include <vector>
 
 #include "model/map_likelihood.hpp"
 #include "model/touch_evidence.hpp"

@@ -1,8 +1,6 @@
 #include "recognition/record_json.hpp"
 
-#include <algorithm>
 #include <numbers>
-#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -4,8 +4,6 @@
 #include <iterator>
 #include <set>
 
-#include <fmt/format.h>
-
 #include "io/input_file.hpp"
 #include "io/recording_rules.hpp"
 #include "options/option.hpp"

@@ -8,8 +8,6 @@
 #include <type_traits>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "call.hpp"
 #include "model/own_process.hpp"
 #include "palpate/device.hpp"

@@ -1,7 +1,6 @@
 // palpate evaluate on results written by hand, whose scores are worked out here, and on results
 // that it cannot take.
 
-#include <algorithm>
 #include <cmath>
 
 #include "recognition/judged_results.hpp"

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 
 #include "palpate/files.hpp"
 #include "palpate/frame_recorder.hpp"

@@ -58,7 +58,7 @@ TEST(MovedFrom, FiltersMapBuildersAndDevicesSaySo) {
 
   PoseHistogram histogram(shared_device(), objects, {.lattice = small_lattice()});
   histogram.update(touch);
-  const auto told = told_by(histogram);
+  const auto told = all_answers(histogram);
   PoseHistogram second(std::move(histogram));
   expect_refused(
       {[&] { histogram.reset(); }, [&] { histogram.update(touch); }, [&] { histogram.estimate(); },
@@ -67,7 +67,7 @@ TEST(MovedFrom, FiltersMapBuildersAndDevicesSaySo) {
        [&] { histogram.paths(); }, [&] { histogram.device_bytes(); }},
       "histogram: was moved from");
   histogram = std::move(second);
-  EXPECT_EQ(told_by(histogram), told);
+  EXPECT_EQ(all_answers(histogram), told);
 
   ParticleFilter filter(shared_device(), objects, {.particles = 10});
   const ParticleFilter other(std::move(filter));
@@ -116,22 +116,22 @@ TYPED_TEST(MovedPivot, MakesAFilterWhatItIsWithThePivotFromTheStart) {
   const std::vector<Touch> touches = all_touches(recording);
   TypeParam filter = make(kind, {0.0, 0.0});
   filter.update(touches);  // about another pivot, which nothing may be left of
-  const auto before = told_by(filter);
+  const auto before = all_answers(filter);
   expect_named(input_error([&] { filter.move_pivot(pivot_mm); }), {"reset()"});
-  EXPECT_EQ(told_by(filter), before) << "stays where there are touches about it";
+  EXPECT_EQ(all_answers(filter), before) << "stays where there are touches about it";
   filter.reset();
   for (const double far : {nan, 2.0 * farthest_mm}) {
     expect_named(input_error([&] { filter.move_pivot({far, 0.0}); }), {"pivot_mm"});
   }
   filter.update(touches);
-  EXPECT_EQ(told_by(filter), before) << "over a reset and where it is refused";
+  EXPECT_EQ(all_answers(filter), before) << "over a reset and where it is refused";
   filter.reset();
   filter.move_pivot(pivot_mm);
   TypeParam built = make(kind, pivot_mm);
   for (int round = 0; round < 2; ++round) {
     filter.update(touches);
     built.update(touches);
-    EXPECT_EQ(told_by(filter), told_by(built)) << "also over a reset: " << round;
+    EXPECT_EQ(all_answers(filter), all_answers(built)) << "also over a reset: " << round;
     filter.reset();
     built.reset();
   }

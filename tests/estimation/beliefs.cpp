@@ -28,7 +28,7 @@ Device lowered_device(const std::function<void(gpu::Limits&)>& lower) {
   return device;
 }
 
-std::vector<std::vector<double>> told_by(const PoseHistogram& histogram) {
+std::vector<std::vector<double>> all_answers(const PoseHistogram& histogram) {
   const Estimate estimate = histogram.estimate();
   const RefinedPose refined = histogram.refine(estimate.mode);
   std::vector<std::vector<double>> told{
@@ -47,7 +47,7 @@ std::vector<std::vector<double>> told_by(const PoseHistogram& histogram) {
   return told;
 }
 
-std::vector<std::vector<double>> told_by(const ParticleFilter& filter) {
+std::vector<std::vector<double>> all_answers(const ParticleFilter& filter) {
   const Estimate estimate = filter.estimate();
   std::vector<double> particles;
   for (const auto& [object, pose, weight] : filter.particles()) {

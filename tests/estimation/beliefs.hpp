@@ -28,8 +28,8 @@ PoseLattice small_lattice();
 Device lowered_device(const std::function<void(gpu::Limits&)>& lower);
 
 /// All that a filter tells: beliefs, marginals, identities and the mode, or particles.
-std::vector<std::vector<double>> told_by(const PoseHistogram& histogram);
-std::vector<std::vector<double>> told_by(const ParticleFilter& filter);
+std::vector<std::vector<double>> all_answers(const PoseHistogram& histogram);
+std::vector<std::vector<double>> all_answers(const ParticleFilter& filter);
 
 /// The log odds of "none of these", by its definition and by a histogram. Its own evidence takes
 /// touches as if they lay where the robot says.

@@ -1,6 +1,5 @@
 // Touches of uncertain pose, and objects that slip between touches.
 
-#include <cmath>
 #include <tuple>
 #include <utility>
 

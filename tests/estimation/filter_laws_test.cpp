@@ -37,7 +37,7 @@ class Laws : public testing::TestWithParam<Case> {
 template <class Filter>
 void expect_the_same_however_updated(Filter& filter, const std::vector<Touch>& touches) {
   filter.update(touches);
-  const auto at_once = told_by(filter);
+  const auto at_once = all_answers(filter);
 
   filter.reset();
   std::vector<Touch> unsound{touches.front(), touches.back()};
@@ -48,7 +48,7 @@ void expect_the_same_however_updated(Filter& filter, const std::vector<Touch>& t
     (void)filter.estimate();
     EXPECT_THROW(filter.update(unsound), Error);
   }
-  EXPECT_TRUE(told_by(filter) == at_once) << "touch by touch, with refused touches between";
+  EXPECT_TRUE(all_answers(filter) == at_once) << "touch by touch, with refused touches between";
 
   filter.reset();
   try {
@@ -58,7 +58,7 @@ void expect_the_same_however_updated(Filter& filter, const std::vector<Touch>& t
   }
   filter.reset();
   filter.update(touches);
-  EXPECT_TRUE(told_by(filter) == at_once) << "after an update that was broken off";
+  EXPECT_TRUE(all_answers(filter) == at_once) << "after an update that was broken off";
 }
 
 /// Expects sums over bins to be those of the expected posterior, within so many nats.

@@ -1,7 +1,6 @@
 #include "figures/outlines.hpp"
 
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <vector>
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <chrono>
 #include <functional>
-#include <string>
 #include <type_traits>
 #include <utility>
 

@@ -18,7 +18,7 @@ Estimate expect_numbers(Filter& filter, std::span<const Touch> touches) {
   filter.reset();
   filter.update(touches);
   Estimate estimate = filter.estimate();
-  EXPECT_NEAR(total(estimate.identity) + estimate.none, 1.0, 1e-9);
+  EXPECT_NEAR(sum(estimate.identity) + estimate.none, 1.0, 1e-9);
   EXPECT_TRUE(is_finite(estimate.mode.T_object_robot));
   EXPECT_TRUE(std::isfinite(estimate.mode.log_likelihood));
   return estimate;

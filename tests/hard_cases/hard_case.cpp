@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
-#include <numeric>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -51,10 +50,6 @@ void expect_finite(const RefinedPose& refined) {
   for (const int i : {0, 4, 8}) {
     EXPECT_GE(refined.covariance[static_cast<std::size_t>(i)], 0.0);
   }
-}
-
-double total(std::span<const double> numbers) {
-  return std::accumulate(numbers.begin(), numbers.end(), 0.0);
 }
 
 HardCase::~HardCase() {
@@ -126,7 +121,7 @@ Estimate HardCase::expect_posterior(std::span<const Hypothesis> objects,
     }
   }
 
-  EXPECT_NEAR(total(estimate.identity), 1.0, 1e-12) << name_;
+  EXPECT_NEAR(sum(estimate.identity), 1.0, 1e-12) << name_;
   expect("identity", largest_difference(estimate.identity, reference::identity(expected)),
          allowed.identity);
 
@@ -148,8 +143,8 @@ Estimate HardCase::expect_posterior(std::span<const Hypothesis> objects,
     check("marginals", largest_difference(theta, reference::marginal_theta(expected, o)),
           allowed.marginal);
     const double p = estimate.identity[static_cast<std::size_t>(o)];
-    check("sum of marginals", std::abs(total(xy) - p), reduction);
-    check("sum of marginals", std::abs(total(theta) - p), reduction);
+    check("sum of marginals", std::abs(sum(xy) - p), reduction);
+    check("sum of marginals", std::abs(sum(theta) - p), reduction);
   }
   return estimate;
 }
@@ -189,15 +184,15 @@ ParticleFilter HardCase::expect_particles(std::span<const Hypothesis> objects,
     filter.update(touch);
     const std::vector<ParticleFilter::Particle> particles = filter.particles();
     std::vector<double> expected;
-    double sum = 0.0;
+    double all = 0.0;
     for (const ParticleFilter::Particle& particle : particles) {
       const OccupancyGrid& map = objects[static_cast<std::size_t>(particle.object)].map;
       EXPECT_TRUE(is_finite(particle.T_object_robot));
       expected.push_back(
           reference::log_likelihood(touch, particle.T_object_robot, map, options.contact));
-      sum += particle.weight;
+      all += particle.weight;
     }
-    EXPECT_NEAR(sum, 1.0, 1e-12);
+    EXPECT_NEAR(all, 1.0, 1e-12);
     // The largest error of the weights that are not negligible.
     const double most = *std::max_element(expected.begin(), expected.end());
     const std::vector<double> weights = reference::importance_weights(expected);
@@ -211,7 +206,7 @@ ParticleFilter HardCase::expect_particles(std::span<const Hypothesis> objects,
     EXPECT_GE(filter.effective_sample_size(), 1.0);
     EXPECT_LE(filter.effective_sample_size(), options.particles);
     const Estimate estimate = filter.estimate();
-    EXPECT_NEAR(total(estimate.identity), 1.0, 1e-12);
+    EXPECT_NEAR(sum(estimate.identity), 1.0, 1e-12);
     EXPECT_TRUE(std::isfinite(estimate.mode.log_likelihood));
     EXPECT_TRUE(is_finite(estimate.mode.T_object_robot));
   }

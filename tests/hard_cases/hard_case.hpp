@@ -4,7 +4,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "palpate/map_builder.hpp"
 #include "palpate/particle_filter.hpp"
@@ -93,8 +92,5 @@ bool all_finite(std::span<const double> numbers);
 bool is_finite(const Pose& pose);
 /// Expects finite numbers and no negative variance.
 void expect_finite(const RefinedPose& refined);
-
-/// The sum of the numbers.
-double total(std::span<const double> numbers);
 
 }  // namespace palpate

@@ -123,8 +123,8 @@ TEST(FiftyMillionBins, OfWhichOneOrAllHoldTheMass) {
   const auto theta = static_cast<std::size_t>(chosen_bin / lattice.plane());
   hard.expect("mass of the one bin", std::abs(marginals.xy[in_plane] - 1.0), 1e-15);
   hard.expect("mass of the one bin", std::abs(marginals.theta[theta] - 1.0), 1e-15);
-  hard.expect("mass of the others", total(marginals.xy) - marginals.xy[in_plane], 1e-20);
-  hard.expect("mass of the others", total(marginals.theta) - marginals.theta[theta], 1e-20);
+  hard.expect("mass of the others", sum(marginals.xy) - marginals.xy[in_plane], 1e-20);
+  hard.expect("mass of the others", sum(marginals.theta) - marginals.theta[theta], 1e-20);
   {
     const std::vector<double> product = histogram.log_likelihood(0);
     EXPECT_TRUE(all_finite(product));

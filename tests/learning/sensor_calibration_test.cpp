@@ -2,7 +2,6 @@
 
 #include <numbers>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>

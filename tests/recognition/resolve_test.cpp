@@ -5,7 +5,6 @@
 #include <memory>
 #include <numbers>
 #include <utility>
-#include <vector>
 
 #include <gmock/gmock.h>
 

@@ -232,7 +232,7 @@ void expect_the_same_after_a_cancel(std::span<const Hypothesis> objects, Bounded
     last = point;
     EXPECT_THROW(posterior.estimate(), Cancelled) << "at cancel point " << point;
     last = -1;
-    EXPECT_EQ(told_by(posterior, objects.size()), told) << "cancelled at point " << point;
+    EXPECT_EQ(all_answers(posterior, objects.size()), told) << "cancelled at point " << point;
   }
 }
 
@@ -245,7 +245,7 @@ std::vector<Certified> expect_laws(std::span<const Hypothesis> objects,
   const std::size_t count = objects.size();
   const bool certified = !options.none_weight;
   BoundedPosterior posterior(objects, options);
-  const auto untouched = told_by(posterior, count);
+  const auto untouched = all_answers(posterior, count);
   reference::Posterior truth = reference_posterior(objects, options, {});
   std::vector<Certified> seen;
   const auto look = [&] {
@@ -265,14 +265,14 @@ std::vector<Certified> expect_laws(std::span<const Hypothesis> objects,
     }
     look();
   }
-  const auto told = told_by(posterior, count);
-  EXPECT_EQ(told_by(posterior, count), told) << "asked again";
+  const auto told = all_answers(posterior, count);
+  EXPECT_EQ(all_answers(posterior, count), told) << "asked again";
   posterior.reset();
-  EXPECT_EQ(told_by(posterior, count), untouched) << "after a reset";
+  EXPECT_EQ(all_answers(posterior, count), untouched) << "after a reset";
   posterior.update(touches);
   posterior.reset();  // of touches that nothing has asked about
   posterior.update(touches);
-  EXPECT_EQ(told_by(posterior, count), told) << "all at once, after a reset";
+  EXPECT_EQ(all_answers(posterior, count), told) << "all at once, after a reset";
 
   BoundedOptions on_one_thread = options;
   on_one_thread.threads = 1;
@@ -281,7 +281,7 @@ std::vector<Certified> expect_laws(std::span<const Hypothesis> objects,
     another_order.update(touches[i == 0 ? 0 : touches.size() - i]);
     another_order.sample(3, i);
   }
-  EXPECT_EQ(told_by(another_order, count), told) << "in another order, on one thread";
+  EXPECT_EQ(all_answers(another_order, count), told) << "in another order, on one thread";
   expect_the_same_after_a_cancel(objects, options, touches, told);
 
   const Pose T_moved_robot{{31.0, -17.0}, 0.9};
@@ -299,7 +299,8 @@ std::vector<Certified> expect_laws(std::span<const Hypothesis> objects,
   return seen;
 }
 
-std::vector<std::vector<double>> told_by(const BoundedPosterior& posterior, std::size_t objects) {
+std::vector<std::vector<double>> all_answers(const BoundedPosterior& posterior,
+                                             std::size_t objects) {
   const Estimate estimate = posterior.estimate();
   const Certificate certificate = estimate.certificate.value();
   const RefinedPose refined = posterior.refine(estimate.mode);

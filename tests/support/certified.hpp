@@ -54,6 +54,7 @@ std::vector<Certified> expect_laws(std::span<const Hypothesis> objects,
                                    double nats = 1e-9);
 
 /// All numbers that a posterior tells, but the counts of its search and what a budget decides.
-std::vector<std::vector<double>> told_by(const BoundedPosterior& posterior, std::size_t objects);
+std::vector<std::vector<double>> all_answers(const BoundedPosterior& posterior,
+                                             std::size_t objects);
 
 }  // namespace palpate

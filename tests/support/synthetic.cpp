@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 namespace palpate {
 
@@ -65,6 +66,10 @@ Recording moved(Recording recording, const Pose& T_moved_robot) {
     pose = T_moved_robot * pose;
   }
   return recording;
+}
+
+double sum(std::span<const double> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
 double largest_difference(std::span<const double> a, std::span<const double> b) {

@@ -4,7 +4,6 @@
 #include <iterator>
 #include <numbers>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "palpate/map_builder.hpp"
@@ -52,6 +51,7 @@ std::vector<Touch> all_touches(const Recording& recording);
 /// A recording's touches as a robot frame moved by T_moved_robot has them.
 Recording moved(Recording recording, const Pose& T_moved_robot);
 
+double sum(std::span<const double> values);
 /// Largest absolute difference, element by element; infinite where the sizes differ.
 double largest_difference(std::span<const double> a, std::span<const double> b);
 

@@ -2,7 +2,6 @@
 
 #include <functional>
 #include <string>
-#include <vector>
 
 #include "palpate/occupancy_grid.hpp"
 #include "palpate/touch.hpp"

@@ -1,6 +1,5 @@
 #include "cli/page/live_page.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <vector>
 
 #include "palpate/api.hpp"
 #include "palpate/sensor.hpp"

@@ -1,7 +1,5 @@
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>

@@ -1,10 +1,8 @@
 #include "bound_cases.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "support/shared_device.hpp"
 #include "support/touched_shape.hpp"
@@ -202,10 +200,6 @@ Recording touches_on_nodes(double cell_mm) {
     }
   }
   return recording;
-}
-
-double sum(std::span<const double> values) {
-  return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
 HistogramOptions dense_options(const BoundedOptions& options) {

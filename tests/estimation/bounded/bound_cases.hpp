@@ -2,9 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
@@ -98,8 +96,6 @@ PoseLattice cell_by_cell(double cell_mm);
 /// Touches whose elements lie exactly on the nodes of such cells, or on the borders between them,
 /// at every bin of cell_by_cell().
 Recording touches_on_nodes(double cell_mm);
-
-double sum(std::span<const double> values);
 
 /// The options of a histogram over the same bins, displacements and "none of these".
 HistogramOptions dense_options(const BoundedOptions& options);

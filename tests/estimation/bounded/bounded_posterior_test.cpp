@@ -66,10 +66,10 @@ TEST(BoundedPosterior, TakesInAllTouchesOrNone) {
   recording.T_robot_sensor[3].translation_mm.x = nan;
   BoundedPosterior posterior(two_shapes(), options);
   posterior.update(sound[0]);
-  const auto before = told_by(posterior, 2);
+  const auto before = all_answers(posterior, 2);
   expect_named(input_error([&] { posterior.update(all_touches(recording)); }),
                {"T_robot_sensor is not finite"});
-  EXPECT_EQ(told_by(posterior, 2), before);
+  EXPECT_EQ(all_answers(posterior, 2), before);
   int calls = 0;
   const auto break_off = [&](double done) {
     EXPECT_EQ(done, 1.0);
@@ -78,11 +78,11 @@ TEST(BoundedPosterior, TakesInAllTouchesOrNone) {
   };
   EXPECT_THROW(posterior.update(std::span(sound).subspan(1), break_off), std::runtime_error);
   EXPECT_EQ(calls, 1);
-  EXPECT_EQ(told_by(posterior, 2), before);
+  EXPECT_EQ(all_answers(posterior, 2), before);
   posterior.update(std::span(sound).subspan(1));
   BoundedPosterior other(two_shapes(), options);
   other.update(sound);
-  EXPECT_EQ(told_by(posterior, 2), told_by(other, 2)) << "as if nothing had been refused";
+  EXPECT_EQ(all_answers(posterior, 2), all_answers(other, 2)) << "as if nothing had been refused";
 }
 
 TEST(BoundedPosterior, CanBeCancelledInEveryCallThatSearches) {
@@ -110,20 +110,20 @@ TEST(BoundedPosterior, MovesItsPivotOnlyBeforeATouch) {
   moved.move_pivot({-3.0, 4.0});
   options.lattice.pivot_mm = {-3.0, 4.0};
   BoundedPosterior made(two_shapes(), options);
-  EXPECT_EQ(told_by(moved, 2), told_by(made, 2));
+  EXPECT_EQ(all_answers(moved, 2), all_answers(made, 2));
   moved.update(all_touches(recording));
   made.update(all_touches(recording));
-  const auto told = told_by(made, 2);
-  EXPECT_EQ(told_by(moved, 2), told);
+  const auto told = all_answers(made, 2);
+  EXPECT_EQ(all_answers(moved, 2), told);
   expect_named(input_error([&] {
                  moved.move_pivot({1.0, 1.0});
                }),
                {"call reset() before the pivot moves"});
-  EXPECT_EQ(told_by(moved, 2), told);
+  EXPECT_EQ(all_answers(moved, 2), told);
   moved.reset();
   expect_named(input_error([&] { moved.move_pivot({nan, 0.0}); }), {"pivot_mm"});
   moved.update(all_touches(recording));
-  EXPECT_EQ(told_by(moved, 2), told) << "the pivot stays over reset()";
+  EXPECT_EQ(all_answers(moved, 2), told) << "the pivot stays over reset()";
 }
 
 // Asked on purpose, each of them. NOLINTBEGIN(bugprone-use-after-move)

@@ -4,7 +4,6 @@
 #include "estimation/bounded/displaced/displacement_mean.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <set>
 #include <vector>

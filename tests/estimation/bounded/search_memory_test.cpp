@@ -2,7 +2,6 @@
 
 #include "estimation/bounded/search_memory.hpp"
 
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>

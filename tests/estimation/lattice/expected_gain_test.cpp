@@ -1,6 +1,5 @@
 #include "estimation/lattice/expected_gain.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numeric>
 

@@ -43,14 +43,14 @@ TEST_F(PoseHistogramTest, UnknownElementsAndTouchesChangeNoBit) {
   }
   one.update(all_touches(known));
   other.update(all_touches(more));
-  EXPECT_EQ(told_by(one), told_by(other));
+  EXPECT_EQ(all_answers(one), all_answers(other));
 
   Recording unknown = random_recording(2, 36, 98);
   unknown.pressure.assign(unknown.pressure.size(), 1.0);
   other.update(all_touches(unknown));
   other.update(std::span<const Touch>{});
   other.update(all_touches(random_recording(2, 0, 99)));
-  EXPECT_EQ(told_by(one), told_by(other));
+  EXPECT_EQ(all_answers(one), all_answers(other));
 }
 
 TEST_F(PoseHistogramTest, ADimensionOfZeroExtentCostsOneBin) {

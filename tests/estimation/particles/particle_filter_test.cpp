@@ -32,7 +32,7 @@ TEST(ParticleFilter, StartsUniformByPriorWeightAndReturnsToIt) {
   const ParticleFilter untouched(shared_device(), objects, options);
   const Recording recording = random_recording(2, 36, 432);
   for (const bool after_reset : {false, true}) {
-    EXPECT_EQ(told_by(filter), told_by(untouched)) << after_reset;
+    EXPECT_EQ(all_answers(filter), all_answers(untouched)) << after_reset;
     EXPECT_EQ(filter.effective_sample_size(), 4000.0);
     const std::vector<double> identity = filter.estimate().identity;
     EXPECT_NEAR(identity[0], 0.25, 1e-12) << "float64 sums";
@@ -55,7 +55,7 @@ TEST(ParticleFilter, StartsUniformByPriorWeightAndReturnsToIt) {
       EXPECT_NEAR(sum[axis], 0.5, 5.0 * std::sqrt(1.0 / 12.0 / 4000.0));
     }
     filter.update(all_touches(recording));
-    EXPECT_NE(told_by(filter), told_by(untouched));
+    EXPECT_NE(all_answers(filter), all_answers(untouched));
     filter.reset();
   }
 }
@@ -132,11 +132,11 @@ TEST(ParticleFilter, TheSeedDecidesEveryBit) {
   ParticleFilter second(shared_device(), three_objects(), options);
   options.seed += std::uint64_t{1} << 32;
   const ParticleFilter other(shared_device(), three_objects(), options);
-  EXPECT_NE(told_by(first), told_by(other)) << "the upper half of the seed counts";
+  EXPECT_NE(all_answers(first), all_answers(other)) << "the upper half of the seed counts";
   const Recording recording = random_recording(4, 36, 438);
   first.update(all_touches(recording));
   second.update(all_touches(recording));
-  EXPECT_EQ(told_by(first), told_by(second));
+  EXPECT_EQ(all_answers(first), all_answers(second));
 }
 
 TEST(ParticleFilter, MemoryCountsWhatAnEstimateTakes) {
