@@ -10,7 +10,6 @@
 #include <map>
 #include <mutex>
 #include <optional>
-#include <ranges>
 #include <utility>
 
 #include "cli/options.hpp"
@@ -85,8 +84,11 @@ class Pipeline {
     std::size_t first = 0;
     for (const BatchEntry& entry : run.task.inputs) {
       const std::size_t end = first + run.task.unknowns_of(entry);
-      if (std::ranges::any_of(std::views::iota(first, end),
-                              [&](std::size_t unknown) { return run.wanted[chunk_of(unknown)]; })) {
+      bool wanted = false;
+      for (std::size_t unknown = first; unknown < end; ++unknown) {
+        wanted = wanted || run.wanted[chunk_of(unknown)];
+      }
+      if (wanted) {
         inputs_.push_back({first, &entry});
       }
       first = end;
