@@ -50,6 +50,14 @@ class Resumption(Batch):
         self.palpate(*batch("s"), status=3)
         self.assertEqual(self.merged("s"), self.expected)
 
+    # Two threads: the one that cannot write its first chunk ends the other.
+    def test_ends_soon_where_a_file_cannot_be_written(self) -> None:
+        many = batch_of(["A.h5"], "s", "--each-frame", "--chunk", "1", "--threads", "2")
+        self.palpate(*many, "--shard", "191/192")
+        (self.folder / "s/runs/000000.json").mkdir()
+        self.assert_failed(2, many, "s/runs/000000.json")
+        self.assertLess(len([*(self.folder / "s/chunks").iterdir()]), 191)
+
     def test_by_many_processes_writes_the_bytes_of_one(self) -> None:
         def without_runs(results: str) -> dict[str, bytes]:
             content = self.content(results).items()

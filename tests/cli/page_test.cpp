@@ -8,6 +8,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <future>
 #include <optional>
@@ -18,8 +19,11 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "cli/page/viewed_files.hpp"
+#include "palpate/files.hpp"
+#include "support/sample_files.hpp"
 #include "support/scratch_folder.hpp"
 
 namespace palpate::page_test {
@@ -254,6 +258,18 @@ class ViewedFiles : public testing::Test {
 
   ScratchFolder folder_;
 };
+
+TEST_F(ViewedFiles, RecordingsTellTheirScaleAndTheirRows) {
+  Recording recording = sample_training("A", 8);
+  recording.pressure.assign(recording.pressure.size(), 3.0);
+  std::fill_n(recording.pressure.begin(), 9, 50.0);  // of 288
+  recording.pressure[0] = 1e38;
+  write_recording(folder_ / "a.h5", recording);
+  const cli::ViewedFiles files(std::vector{(folder_ / "a.h5").string()});
+  EXPECT_NEAR(nlohmann::json::parse(files.get("/file/0").value())["largest"], 50.0, 2.0);
+  EXPECT_EQ(nlohmann::json::parse(files.get("/file/0/rows/7").value())["pose"].size(), 1u);
+  EXPECT_FALSE(files.get("/file/0/rows/8"));
+}
 
 TEST_F(ViewedFiles, FieldsOfAWrongTypeAreNamed) {
   const std::pair<const char*, const char*> cases[] = {

@@ -211,8 +211,7 @@ void FakeUsbDevice::occupy(bool occupied) {
 void FakeUsbDevice::forbid() {
   // Otherwise umockdev would ask its own socket before the file.
   umockdev_testbed_detach_ioctl(usb_.testbed(), node().c_str(), nullptr);
-  const bool is_root = geteuid() == 0;
-  chmod((usb_.root() + node()).c_str(), is_root ? S_IRUSR | S_IWUSR : 0);
+  chmod((usb_.root() + node()).c_str(), 0);
 }
 
 FakeUsbDevice::Seen FakeUsbDevice::seen() const {

@@ -98,7 +98,7 @@ class FakeUsbDevice {
   void send_fault(Fault fault, int times = 1);
   /// Answers control requests, refuses each by a stall, or never answers one.
   void behave(Manner manner);
-  /// Lets only root open the device; nobody if the test is not run by root.
+  /// Takes the permission to open the device from all; root obeys beside an OrdinaryUser.
   void forbid();
   /// Lets another program hold the interface.
   void occupy(bool occupied);

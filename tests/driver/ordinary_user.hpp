@@ -1,36 +1,30 @@
 #pragma once
 
-#include <sys/stat.h>
+#include <linux/capability.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <gtest/gtest.h>
 
-#include "fake_usb_device.hpp"
-
 namespace palpate {
 
-/// Makes the process an ordinary user's while it lives, if the test is run by root.
+/// Has the thread obey files' permissions while it lives, also where root runs the test. It stays
+/// the owner of its files: the sources may lie in a folder that is root's own.
 class OrdinaryUser {
  public:
-  explicit OrdinaryUser(const FakeUsb& usb) : was_root_(geteuid() == 0) {
-    if (was_root_) {
-      // umockdev's library makes and uses sockets there.
-      chmod(usb.root().c_str(), 0777);
-      chmod((usb.root() + "/ioctl/_default").c_str(), 0777);
-      constexpr uid_t nobody = 65534;
-      EXPECT_EQ(seteuid(nobody), 0);
-    }
+  OrdinaryUser() {
+    EXPECT_EQ(syscall(SYS_capget, &header_, before_), 0);
+    __user_cap_data_struct data[2] = {before_[0], before_[1]};
+    data[0].effective &= ~(1u << CAP_DAC_OVERRIDE);
+    EXPECT_EQ(syscall(SYS_capset, &header_, data), 0);
   }
-  ~OrdinaryUser() {
-    if (was_root_) {
-      EXPECT_EQ(seteuid(0), 0);
-    }
-  }
+  ~OrdinaryUser() { EXPECT_EQ(syscall(SYS_capset, &header_, before_), 0); }
   OrdinaryUser(const OrdinaryUser&) = delete;
   OrdinaryUser& operator=(const OrdinaryUser&) = delete;
 
  private:
-  bool was_root_;
+  __user_cap_header_struct header_{_LINUX_CAPABILITY_VERSION_3, 0};
+  __user_cap_data_struct before_[2] = {};
 };
 
 }  // namespace palpate

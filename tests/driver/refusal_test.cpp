@@ -30,7 +30,7 @@ class Refusal : public testing::Test {
 TEST_F(Refusal, MissingPermissionNamesTheRuleAndHowToInstallIt) {
   FakeTakktile board(usb_, "1", {0b11111});
   board.usb().forbid();
-  const OrdinaryUser user(usb_);
+  const OrdinaryUser user;
   const std::string message = refusal(Fault::system);
   expect_named(message, {"no permission", "/dev/bus/usb/001/002", "udevadm control --reload"});
   // The message names a file that exists.

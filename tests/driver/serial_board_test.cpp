@@ -209,7 +209,7 @@ TEST_F(SerialBoards, AreOpenedByOneProgramAtATime) {
 TEST_F(SerialBoards, WithoutPermissionNameTheGroup) {
   const FakePort port(usb_);
   chmod(port.node().c_str(), 0);
-  const OrdinaryUser user(usb_);
+  const OrdinaryUser user;
   expect_refused(Fault::system, "tsf85:" + port.node(), {port.node().c_str(), "sudo usermod -aG "});
 }
 
