@@ -167,7 +167,7 @@ def draw_errors(scores: Json) -> Figure:
 
 def draw_press(beliefs: dict[str, tuple[Trial, Json]]) -> bytes:
     """The readings of one window and of five where they lie, the true contact, and the belief."""
-    figure = Figure(figsize=(11.4, 5.4))
+    figure = Figure(figsize=(11.4, 4.6), layout="constrained")
     for windows, axes in zip(("1", "5"), figure.subplots(1, 2), strict=True):
         trial, step = beliefs[windows]
         trial.touches(AS_BUILT).plot(axes)
@@ -177,7 +177,8 @@ def draw_press(beliefs: dict[str, tuple[Trial, Json]]) -> bytes:
         places = palpate.transform(trial.T_robot_object, PIXEL_MM * pixels - press.centroid_mm)
         x, y = places.T.reshape(2, *press.contact.shape)
         axes.contour(x, y, press.contact, levels=[0.5], colors="black", linestyles="dashed")
-        axes.set(xlim=(-130, 130), ylim=(-130, 130))
+        reach = numpy.abs(places[press.contact.ravel()]).max() + 40  # and the windows about the contact
+        axes.set(xlim=(-reach, reach), ylim=(-reach, reach))
         axes.set_title(f"{windows} of 5 windows: readings, contact (dashed) and belief")
     return charts.image(figure, "png", dpi=100)
 

@@ -144,7 +144,7 @@ def _draw_record(record: Record, ax: "Axes") -> None:
         circle = axes @ (numpy.sqrt(numpy.maximum(widths, 0))[:, None] * [numpy.cos(turn), numpy.sin(turn)])
         length = 2.448 * numpy.sqrt(widths[1])
         for share, radius in ((68, 1.515), (95, 2.448)):
-            ax.plot(x + radius * circle[0], y + radius * circle[1], label=f"{share} %")
+            ax.plot(x + radius * circle[0], y + radius * circle[1], marker="", label=f"{share} %")
         ax.legend()
     modes = [mode for mode in record["modes"] if mode["probability"] >= 0.05]
     for mode in modes if len(modes) > 1 else []:
@@ -154,7 +154,7 @@ def _draw_record(record: Record, ax: "Axes") -> None:
         ax.annotate(words, place, xytext=(3, -9), textcoords="offset points", color="0.4")
     for angle, name in ((theta, "x"), (theta + numpy.pi / 2, "y")):
         end = x + length * numpy.cos(angle), y + length * numpy.sin(angle)
-        ax.plot((x, end[0]), (y, end[1]), color="black")
+        ax.plot((x, end[0]), (y, end[1]), color="black", marker="")
         ax.annotate(name, end, xytext=(3, 3), textcoords="offset points")
     ax.set_title(f"{record['best']}, {100 * record['identity'][record['best']]:.1f} %")
 
