@@ -194,8 +194,8 @@ void add_calibrate(CLI::App& app) {
   const auto [command, options] = add_command<CalibrateArguments>(
       app, "calibrate",
       "Learn a sensor model from touches of known objects: contact threshold, noise, what the "
-      "elements read on and beside an object, and how sure to be. map, recognize, live and plan "
-      "take it as --sensor-model",
+      "elements read on and beside an object, and how sure to be. map, recognize, live, batch and "
+      "plan take it as --sensor-model",
       calibrate);
   command
       ->add_option(

@@ -181,7 +181,7 @@ CLI::Option* add_array_flags(CLI::App& command, ImportOptions& options) {
                    "How the grid's elements follow each other: rows (along x first) or columns");
   command.add_option("--dead", options.dead,
                      "Elements that do not read, counted from 0 in the order of their readings, as "
-                     "13,42 [default: those without any reading]");
+                     "13,42 [default: in a log those without any reading; of a sensor none]");
   add_with_default(command, "--pressure-unit", options.pressure_unit,
                    "Unit of the pressures: kPa, or raw for readings of another unit");
   add_with_default(command, "--sign", options.sign,

@@ -43,7 +43,7 @@ const std::array table{
            "whichever is larger, widened to half of --touch-sd-* or five quarters of --slip-sd-*, "
            "but at most 2.5 times; fine: as many as the mode needs, too, in steps of 0.6 times the"
            " larger of both. Auto and fine take wider steps where the histogram's device memory is"
-           " short; the region about an automatic pivot fits the largest array of all RECORDINGs "
+           " short; the region about an automatic pivot fits the largest array that touches "
            "[default: auto, or 25x25x16 where a range or a pivot is given]"},
     Option{"x-mm", "region.x_mm", lattice, &Request::x_mm, near,
            "Range of the pivot's x in the object frame, mm, as --x-mm=-10:10 [default: every "
@@ -79,7 +79,7 @@ const std::array table{
            "particles: 5.73, which is 0.1 rad]"},
     Option{"none", "none", general, &Request::none, from_0,
            "Prior weight of \"(none)\", an object that was never learned; a map has the weight 1. "
-           "Without W (write recordings before the flag) it is a ninth of the sum of the maps' "
+           "Without W (then write the flag last) it is a ninth of the sum of the maps' "
            "weights: a probability of one in ten before the first touch. A sensor model's "
            "temperature tempers these odds with the evidence. (none) explains each touch by a "
            "piece of some known object; the pieces need not belong to one pose. One touch cannot "

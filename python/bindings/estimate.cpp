@@ -61,7 +61,7 @@ void bind_mode(nb::module_& module) {
             "RefinedPose(T_robot_object x {:.2f} +-{:.2f} mm, y {:.2f} +-{:.2f} mm, theta {:.3f} "
             "+-{:.3f} rad)",
             pose.T_robot_object.translation_mm.x, sd[0], pose.T_robot_object.translation_mm.y,
-            sd[1], pose.T_robot_object.theta_rad, sd[2]);
+            sd[1], wrap_angle(pose.T_robot_object.theta_rad), sd[2]);
       });
 }
 

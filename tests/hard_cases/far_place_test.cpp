@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "hard_case.hpp"
@@ -26,7 +27,8 @@ std::vector<FarCase> far_cases() {
   std::vector<FarCase> cases;
   const Recording near = random_recording(4, 36, 443);
   for (const glm::dvec2 away_mm : {glm::dvec2(1e6, -1e6), glm::dvec2(-1e6, 0.0)}) {
-    cases.push_back({"poses 1e6 mm from the robot's origin, with a pivot, in bins of 0.1 mm",
+    cases.push_back({fmt::format("poses at {:.0e}, {:.0e} mm, with a pivot, in bins of 0.1 mm",
+                                 away_mm.x, away_mm.y),
                      fine_lattice, moved(near, {away_mm, 0.0})});
     cases.back().lattice.pivot_mm = away_mm;
   }

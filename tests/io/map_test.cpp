@@ -82,7 +82,7 @@ TEST_F(MapFile, NamesAttributesItCannotTake) {
   }
 }
 
-TEST_F(MapFile, NamesLogOddsItCannotTake) {
+TEST_F(MapFile, NamesCellsItCannotTake) {
   expect_named(message(map_parts().dataset("log_odds", {2, 3}, {0, 0, 0, 0, 0, nan})),
                {"'log_odds'[1, 2]", "nan"});
   // Finite in float64, infinite in the grid's float32.
@@ -90,6 +90,7 @@ TEST_F(MapFile, NamesLogOddsItCannotTake) {
   expect_named(message(map_parts().dataset("log_odds", {0, 3})), {"'log_odds'", "[0, 3]"});
   expect_named(message(map_parts().dataset("log_odds", {6})), {"'log_odds'", "dimensions"});
   expect_named(message(map_parts().without("log_odds")), {"'log_odds'", "missing"});
+  expect_named(message(map_parts().dataset("observations", {3, 2})), {"'observations'", "[3, 2]"});
 }
 
 TEST_F(MapFile, IsNotWrittenWhereItCouldNotBeRead) {

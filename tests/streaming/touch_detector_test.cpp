@@ -178,6 +178,16 @@ TEST(TouchDetector, PoseIsTheMeanOfThoseKnownAcrossTheTurn) {
   EXPECT_NEAR(std::abs(wrap_angle(pose.theta_rad, 2 * std::numbers::pi)), std::numbers::pi, 0.002);
 }
 
+TEST(TouchDetector, LoadThatChangesByMoreThanSteadyEndsThePhase) {
+  const auto eased = [](double t) {
+    return std::vector<double>{(t < 1.5 ? 20.0 : 15.0) * press(t, 0.5, 1.5)};
+  };
+  const std::vector<Frame> frames = PressStream{}.frames(3.0, eased);
+  ASSERT_EQ(touches_in(frames).size(), 1u);
+  EXPECT_NEAR(touches_in(frames)[0].pressure[0], 20.0, mean_tolerance);
+  EXPECT_LT(touches_in(frames, {.steady = 0.3})[0].pressure[0], 19.0);
+}
+
 TEST(TouchDetector, OfASlideTheLongestRestCounts) {
   const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 0.5, 3.0)}; };
   std::vector<Frame> frames = PressStream{}.frames(5.0, held);
