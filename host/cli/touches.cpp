@@ -79,7 +79,8 @@ std::vector<std::string> frame_findings(const Rest& rest, std::uint64_t backward
 /// Watches the presses of a stream for what keeps them from being touches.
 class PressWatch {
  public:
-  explicit PressWatch(const TouchDetectorOptions& options) : options_(options) {}
+  PressWatch(const TouchDetectorOptions& options, bool slides)
+      : options_(options), slides_(slides) {}
 
   /// @param smoothed what the detector judges the frame by
   void add(const Frame& frame, const std::vector<double>& smoothed, bool touching) {
@@ -109,8 +110,9 @@ class PressWatch {
                                             press_->begin_s - *first_s_, last_s_ - press_->begin_s);
       reasons_.push_back(
           press_->moved_mm >= options_.steady_mm
-              ? fmt::format("{} moved by {:.1f} mm (hold the array still, or give --slide MM)",
-                            press, press_->moved_mm)
+              ? fmt::format("{} moved by {:.1f} mm ({})", press, press_->moved_mm,
+                            slides_ ? "slide further, steadily, or give a smaller --slide"
+                                    : "hold the array still, or give --slide MM")
               : fmt::format("{} was never steady for {:g} s (press longer, or give another "
                             "--min-steady-s or --steady)",
                             press, options_.min_steady_s));
@@ -144,6 +146,7 @@ class PressWatch {
   };
 
   TouchDetectorOptions options_;
+  bool slides_ = false;            ///< strokes are cut into touches
   std::optional<double> first_s_;  ///< of the stream
   double last_s_ = 0.0;
   std::optional<Press> press_;  ///< under way
@@ -257,7 +260,7 @@ void find_touches(const TouchesArguments& options) {
   std::uint64_t unreadable = 0;
   std::size_t without_pose = 0;
   bool touching = false;
-  PressWatch watch(thresholds);
+  PressWatch watch(thresholds, options.slide_mm.has_value());
   std::optional<StrokeTouches> stroke;
   if (options.slide_mm) {
     stroke.emplace(*options.slide_mm, sensor.valid);

@@ -59,8 +59,8 @@ void draw_frame(Canvas& canvas, const View& view) {
   const Pen pen{.width_px = 3.0, .halo_px = 2.0};
   canvas.segment(origin, origin + glm::dvec2(arm_px, 0.0), pen);
   canvas.segment(origin, origin - glm::dvec2(0.0, arm_px), pen);
-  for (const auto& [letter, place] :
-       {std::pair("x", glm::dvec2(arm_px + 13.0, 0.0)), std::pair("y", glm::dvec2(0.0, -arm_px - 13.0))}) {
+  for (const auto& [letter, place] : {std::pair("x", glm::dvec2(arm_px + 13.0, 0.0)),
+                                      std::pair("y", glm::dvec2(0.0, -arm_px - 13.0))}) {
     canvas.disc(origin + place, 11.0, {1.0, 1.0, 1.0});
     canvas.text(letter, origin + place + glm::dvec2(0.0, 5.0), body, Align::centre);
   }

@@ -94,7 +94,8 @@ void LineSensor::take(const LineReader::Line& line) {
 bool LineSensor::may_stand_before(const LineReader::Line& line, const FrameLines::Flaw& flaw) {
   constexpr std::uint64_t limit = 100;
   const bool is_cut = line.number == 1 && !trimmed(line.text).starts_with('{');
-  if (counters_.frames > 0 || before_ == limit || !(is_cut || FrameLines::is_text(line.text))) {
+  if (counters_.frames > 0 || before_ == limit || format_.names_columns(line.text) ||
+      !(is_cut || FrameLines::is_text(line.text))) {
     return false;
   }
   format_ = FrameLines(format_.elements());  // numbers among the words are no columns
@@ -128,7 +129,7 @@ void LineSensor::say_first(double now_s, double time_s) {
   }
   // Times since 1970 show their unit by their size, others by how far frames lie apart.
   const double step_s = (first_s_.back() - first_s_.front()) / static_cast<double>(enough - 1);
-  if (time_s > latest_s || step_s >= 1.0) {
+  if (time_s > latest_s || step_s > 2.0) {
     const double per_s = time_s > latest_s ? time_s / latest_s : step_s;
     warn_(fmt::format(
         "{}: its frames are {:.3g} s apart by their times, which look like {}; write seconds",

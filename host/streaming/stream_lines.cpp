@@ -291,6 +291,18 @@ bool FrameLines::is_text(std::string_view line) {
   return 2 * static_cast<std::size_t>(words) >= cells.size();
 }
 
+bool FrameLines::names_columns(std::string_view line) const {
+  std::vector<std::string_view> cells;
+  const char separator = separator_of(line);
+  return !is_json(trimmed(line)) && separator != ' ' &&
+         split_cells(line, separator, cells) == nullptr && cells.size() > 1 &&
+         std::ranges::all_of(
+             cells, [](std::string_view cell) { return cell.empty() || !reading_in(cell); }) &&
+         (cells.size() >= elements_ || std::ranges::any_of(cells, [](std::string_view cell) {
+            return std::ranges::find(names, cell) != names.end();
+          }));
+}
+
 FrameLines::Line FrameLines::frame_of(Numbers numbers, std::vector<double> values,
                                       double now_s) const {
   if (values.size() != elements_) {

@@ -110,6 +110,9 @@ class FrameLines {
   /// True for a line of words, such as a board prints as it starts: no JSON, and at most half of it
   /// numbers.
   static bool is_text(std::string_view line);
+  /// True for words between commas, semicolons or tabs that are the header of other columns than
+  /// these lines may have: as many as there are elements, or with a name of a time or pose.
+  bool names_columns(std::string_view line) const;
 
  private:
   static constexpr std::array<const char*, 4> names{"time", "x_mm", "y_mm", "theta_rad"};

@@ -223,8 +223,11 @@ TEST_F(LineSensorInput, LeavesOutWhatABoardPrintsAsItStarts) {
 }
 
 TEST_F(LineSensorInput, SaysWhereTimesAreInNoSeconds) {
-  const std::pair<double, const char*> clocks[] = {
-      {10.0, "milliseconds"}, {1e4, "microseconds"}, {1e7, "nanoseconds"}, {0.01, nullptr}};
+  const std::pair<double, const char*> clocks[] = {{10.0, "milliseconds"},
+                                                   {1e4, "microseconds"},
+                                                   {1e7, "nanoseconds"},
+                                                   {0.01, nullptr},
+                                                   {1.0, nullptr}};
   for (const auto& [step, unit] : clocks) {
     LineSensor sensor = open();
     for (int i = 0; i < 30; ++i) {
@@ -246,6 +249,8 @@ TEST_F(LineSensorInput, EndsWithAnErrorWithoutAFrame) {
   }
   for (const auto& [text, place] :
        {std::pair<std::string, const char*>{"boot\n1,2\n1,2,3\n", "line 2: has 2 numbers"},
+        {"time,x_m,y_m,yaw,a,b,c\n0.5,1,2,3,4,5,6\n", "line 1: names 6 readings"},
+        {"boot\na,b,c,d\n0.5,1,2,3\n", "line 2: "},
         {lines, "line 101: "}}) {
     LineSensor sensor = open(text);
     expect_named(input_error([&] { sensor.next(0ms); }), {"standard input, ", place});
