@@ -254,8 +254,10 @@ void live(const LiveArguments& options) {
   state = recognition.state();
   judge_frames(state);
   if (state.all_touches == 0 && state.without_pose > 0 && !interruption.requested()) {
-    refuse(source, "none of its {} touches has a pose; give --poses{}", state.without_pose,
-           opened.lines != nullptr ? ", or x_mm, y_mm and theta_rad in its lines" : "");
+    refuse(source, "none of its {} touches has a pose; {}", state.without_pose,
+           !options.poses.empty()    ? "give --poses whose times, s since 1970, are the frames'"
+           : opened.lines != nullptr ? "give --poses, or x_mm, y_mm and theta_rad in its lines"
+                                     : "give --poses");
   }
   show(summary(state, recognition.latencies_ms(), task));
   if (!to_program) {

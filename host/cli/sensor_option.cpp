@@ -37,7 +37,7 @@ TouchDetectorOptions detector_options(const DetectorFlags& flags, const std::str
                                       const std::string& source) {
   TouchDetectorOptions options = flags.options;
   if (flags.onset) {
-    options.onset = *flags.onset;
+    options.onset = require_above("--onset", *flags.onset, 0.0);
   } else if (pressure_unit == "raw") {
     refuse(source, "pressure_unit = raw has no default onset; give --onset");
   }

@@ -125,11 +125,19 @@ class PressWatch {
   /// Why no press made a touch, and what to give, in sentences.
   /// @param unit of the pressures
   std::vector<std::string> reasons(const std::string& unit) const {
-    if (missed_ == 0) {
+    if (missed_ == 0 && largest_ > options_.onset) {
       return {
-          fmt::format("its readings reach {:.3g} {} above their rest, {:.1f} s from its start, and "
-                      "a touch begins above {:g} (lower --onset)",
-                      largest_, unit, largest_s_, options_.onset)};
+          fmt::format("its readings reach {:.3g} {} above their rest, but no two frames of a press "
+                      "lie less than "
+                      "{:g} s apart by their times (give times in seconds, and more frames)",
+                      largest_, unit, options_.largest_gap_s)};
+    }
+    if (missed_ == 0) {
+      return {fmt::format(
+          "its readings reach {:.3g} {} above their rest, {:.1f} s from its start, and "
+          "a touch begins above {:g} (lower --onset, or give --drift-s, more than the longest "
+          "press)",
+          largest_, unit, largest_s_, options_.onset)};
     }
     std::vector<std::string> words = reasons_;
     if (missed_ > most_shown) {
@@ -283,7 +291,7 @@ void find_touches(const TouchesArguments& options) {
   if (rest.falls) {
     refuse(options.frames,
            "its readings fall in presses, where Palpate needs readings that rise; import it again "
-           "with --sign -1");
+           "with --sign -1; if it is pressed most of the time, give --drift-s 0 instead");
   }
   StreamTime time;
   std::vector<double> rest_now;

@@ -86,12 +86,15 @@ void StrokeTouches::add(const Frame& frame) {
   if (!frame.T_robot_sensor || !is_robot_pose(*frame.T_robot_sensor)) {
     return;
   }
-  const Pose& pose = *frame.T_robot_sensor;
+  Pose pose = *frame.T_robot_sensor;
   const auto stays = [&](const FramePlace& place) {
     return distance_mm(*place.T_robot_sensor, pose) < still_mm;
   };
   if (part_.size() == 1 && stays(part_.front())) {
-    part_.clear();  // the part begins where the array leaves its place
+    // The part begins where the array leaves its place, however little it moves from frame to
+    // frame.
+    pose = *part_.front().T_robot_sensor;
+    part_.clear();
     pressure_.clear();
   } else if (part_.size() >= most_frames && stays(part_.back())) {
     return;

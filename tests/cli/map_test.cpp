@@ -318,6 +318,10 @@ TEST_F(MapFrame, TouchesOfUnlikeArraysAreKept) {
   EXPECT_GT(map.source->left_out.value().sd, 0.0);
   Device device = Device::open();
   EXPECT_EQ(with_prior(device, map, map.prior).log_odds, map.log_odds);
+  // By whose prior readings are felt less far, so that they make fewer cells.
+  const OccupancyGrid other = with_prior(device, map, 0.5);
+  EXPECT_EQ(other.log_odds.front(), 0.0F);
+  EXPECT_GT(other.at(map.nx / 2, map.ny / 2) * map.at(map.nx / 2, map.ny / 2), 0.0F);
   OccupancyGrid bare = map;
   bare.source.reset();
   expect_named(input_error([&] { with_prior(device, bare, 0.3); }), {"holds no touches"});

@@ -21,10 +21,10 @@ def still(frames: int = 60) -> Path:
     return numpy.tile([0.0, 0.0, 0.1], (frames, 1))
 
 
-def stroke(begin: tuple[float, float], end: tuple[float, float]) -> Path:
-    """A straight stroke at 20 mm/s, between rests of 0.1 s in which the array presses and lifts."""
+def stroke(begin: tuple[float, float], end: tuple[float, float], mm_per_s: float = 20.0) -> Path:
+    """A straight stroke, between rests of 0.1 s in which the array presses and lifts."""
     length = float(numpy.hypot(end[0] - begin[0], end[1] - begin[1]))
-    part = numpy.linspace(0.0, 1.0, 1 + round(RATE_HZ * length / 20.0))[:, None]
+    part = numpy.linspace(0.0, 1.0, 1 + round(RATE_HZ * length / mm_per_s))[:, None]
     way = numpy.array(begin) + part * (numpy.array(end) - numpy.array(begin))
     rows = numpy.hstack([way, numpy.full((len(way), 1), 0.1)])
     return numpy.vstack([rows[:1].repeat(10, 0), rows, rows[-1:].repeat(10, 0)])
@@ -69,8 +69,10 @@ def test_strokes_recognise_as_presses_at_the_same_places(
     assert records[0].refined_error_mm < records[1].refined_error_mm + 0.1
 
 
-def test_a_press_that_does_not_slide_stays_one_touch(tmp_path: pathlib.Path) -> None:
-    assert cut(tmp_path, [still(), STROKES[0]], "--slide", "4").returncode == 0
+def test_a_press_stays_one_touch_beside_a_slow_stroke(tmp_path: pathlib.Path) -> None:
+    # Of 0.04 mm from frame to frame.
+    presses = [still(), stroke((-9, -6), (8, -6), 4.0)]
+    assert cut(tmp_path, presses, "--slide", "4").returncode == 0
     assert len(palpate.read_recording(tmp_path / "t.h5")) == 1 + 4
 
 

@@ -4,6 +4,8 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/vec2.hpp>
 
 #include "estimation/maps/left_out_fit.hpp"
 #include "model/cell_range.hpp"
@@ -68,16 +70,17 @@ OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior)
   if (map.drawn) {
     return other;
   }
-  if (other.nx != map.nx || other.ny != map.ny) {
-    throw Error(
-        Fault::input,
-        fmt::format("map '{}': its touches make {} x {} cells, but it has {} x {}; build it "
-                    "anew",
-                    map.label, other.nx, other.ny, map.nx, map.ny));
-  }
   OccupancyGrid result = map;
   result.prior = prior;
-  result.log_odds = other.log_odds;
+  // How far a reading is felt depends on the prior: the other map may have a row more or less.
+  const glm::ivec2 from(glm::round((map.origin_mm - other.origin_mm) / map.cell_mm));
+  auto cell = result.log_odds.begin();
+  for (int y = from.y; y < from.y + map.ny; ++y) {
+    for (int x = from.x; x < from.x + map.nx; ++x) {
+      const bool is_felt = x >= 0 && y >= 0 && x < other.nx && y < other.ny;
+      *cell++ = is_felt ? other.at(x, y) : static_cast<float>(other.prior_log_odds());
+    }
+  }
   auto source = std::make_shared<MapSource>(*map.source);
   source->options.sensor.prior = prior;
   if (map.source->left_out) {

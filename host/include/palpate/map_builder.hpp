@@ -106,8 +106,7 @@ struct MapSource {
 
 /// Returns the map as its `source` makes it with another prior, and what its touches are like where
 /// they are left out; its frame, its layers and all else stay.
-/// @throws Error where it has no source, or its cells are not those of its source, and as
-/// MapBuilder does
+/// @throws Error where it has no source, and as MapBuilder does
 PALPATE_API OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior);
 
 /// Estimates p(m) as estimate_prior() does, from the sources of maps and the cells of drawn ones.
