@@ -197,6 +197,14 @@ def _zstd() -> Any:
     raise Error("a reader of Zstandard is missing; pip install 'palpate[bag]'")
 
 
+def place(log: Path) -> Path:
+    """What is read of a log: the folder of a file that stands in the folder's metadata.yaml, else itself."""
+    metadata = log.parent / "metadata.yaml"
+    text = metadata.read_text(errors="replace") if metadata.is_file() else ""
+    listed = rf"^\s*-\s+['\"]?(?:.*/)?{re.escape(log.name)}['\"]?\s*$"
+    return log.parent if re.search(listed, text, re.MULTILINE) else log
+
+
 @contextmanager
 def opened(name: str) -> Iterator[Bag]:
     """The log. Raises Error where it cannot be read, or rosbags is missing."""
@@ -208,8 +216,7 @@ def opened(name: str) -> Iterator[Bag]:
     path = Path(name)
     if not path.exists():
         raise Error(f"{name}: no such file or folder; give a bag")
-    if (path.parent / "metadata.yaml").exists() and re.search(r"\.(db3|mcap)(\.zstd?)?$", name):
-        path = path.parent
+    path = place(path)
     with contextlib.ExitStack() as stack:
         if path.suffix in (".zstd", ".zst"):  # compressed as a whole: a copy is read, which goes
             path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / path.stem

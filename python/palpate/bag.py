@@ -5,6 +5,7 @@
 
 import argparse
 import os
+import pathlib
 import re
 import sys
 import warnings
@@ -14,7 +15,7 @@ import numpy
 
 from ._bag import read_bag, topics
 from ._bag_fields import _at, _flat
-from ._bag_messages import _PRESSURES
+from ._bag_messages import _PRESSURES, place
 from ._bag_transforms import stamp_s as stamp_s
 from ._error import Error
 
@@ -112,6 +113,12 @@ def _run(arguments: argparse.Namespace) -> None:
     folder = os.path.dirname(arguments.output) or "."
     if os.path.isdir(arguments.output) or not os.access(folder, os.W_OK):
         raise Error(f"-o {arguments.output}: cannot be written; give a file in a folder that exists")
+    output, log = pathlib.Path(arguments.output), place(pathlib.Path(arguments.log))
+    # A folder may hold recordings beside its log.
+    files = [(file, "LOG") for file in (log, *log.glob("*")) if file.suffix != ".h5"]
+    for file, reader in (*files, (pathlib.Path(arguments.array), "--array")):
+        if output.exists() and file.exists() and output.samefile(file):
+            raise Error(f"-o {output}: would overwrite {file}, which {reader} reads; choose another name")
     shown = sys.stderr.isatty()
     options = vars(arguments) | {
         "pressure_topic": arguments.pressure_topic.split(","),
@@ -119,8 +126,7 @@ def _run(arguments: argparse.Namespace) -> None:
         "truth_tf": _frames("--truth-tf", arguments.truth_tf),
         "progress": _show_progress if shown else None,
     }
-    output = options.pop("output")
-    del options["list"]
+    del options["list"], options["output"]
     recording = read_bag(**options)
     if shown:
         print(_CLEAR, end="", file=sys.stderr)

@@ -267,6 +267,8 @@ def test_a_log_that_is_cut_off_or_not_there_is_said(tmp_path: pathlib.Path, mcap
     assert "log.bag: cannot be read as a bag" in error_of(topics, log)
     [storage] = mcap.glob("*.mcap")
     whole = storage.read_bytes()
+    storage.with_name("other.mcap").write_bytes(whole[:200])
+    assert "other.mcap: cannot be read as a bag" in error_of(topics, storage.with_name("other.mcap")), "not its folder"
     storage.write_bytes(whole[:200])
     assert "mcap: cannot be read as a bag" in error_of(topics, mcap)
     assert f"mend it by 'mcap recover {storage} -o" in error_of(topics, storage)
@@ -279,7 +281,8 @@ def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_pa
     run = functools.partial(run_program, main)
     listed = subprocess.run([sys.executable, "-m", "palpate.bag", mcap, "--list"], capture_output=True, text=True)
     assert listed.returncode == 0 and "lab_msgs/msg/Hand" in listed.stdout, listed.stderr
-    file = tmp_path / "f.h5"
+    file, array = tmp_path / "f.h5", tmp_path / "array.csv"
+    array.write_text("x,y\n0,0\n1,0\n0,1\n1,1\n")
     flags = ("--pressure-topic", "/plain", "--array", "2:2:2", "--tf", "base:array", "--plane", "0,0,1")
     done = run(mcap, *flags, "-o", file)
     assert done.status == 0, done.err
@@ -293,6 +296,9 @@ def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_pa
         ((mcap, *flags), "--output: missing"),
         ((mcap, *flags, "--tf", "base", "-o", file), "--tf base: give two frames, TARGET:SOURCE"),
         ((tmp_path / "none.bag", "--list"), "none.bag: no such file"),
+        ((mcap, *flags, "-o", mcap / "metadata.yaml"), "metadata.yaml, which LOG reads; choose another name"),
+        ((next(mcap.glob("*.mcap")), *flags, "-o", mcap / "metadata.yaml"), "metadata.yaml, which LOG reads"),
+        ((mcap, *flags[:2], "--array", array, "-o", array), "array.csv, which --array reads; choose another name"),
         ((mcap, *flags, "-o", tmp_path), ": cannot be written; give a file in a folder that exists"),
         ((mcap, *flags, "-o", tmp_path / "none" / "f.h5"), ": cannot be written; give a file"),
         ((mcap, *flags, "--dead", "auto", "-o", file), "--dead auto: 'auto' is no element"),
