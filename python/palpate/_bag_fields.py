@@ -73,11 +73,9 @@ class _Messages:
             row = self._row_of(message)
         except Error as error:
             raise Error(f"{self.where}: {self.path or 'the message'}: {error}") from None
-        time_s = stamp_s(message.header.stamp) if self.has_header else 0.0
-        if time_s <= 0.0:
-            self.received += 1
-            time_s = received_s
-        self.rows.add(time_s, row)
+        stamped_s = stamp_s(message.header.stamp) if self.has_header else 0.0
+        self.received += stamped_s <= 0.0
+        self.rows.add(stamped_s, received_s, row)
 
     def _row_of(self, message: Any) -> "Sequence[float] | Numbers":
         raise NotImplementedError
@@ -86,7 +84,7 @@ class _Messages:
         """Times [n], ascending, and their rows. Raises Error where there are none."""
         if not len(self.rows):
             raise Error(f"{self.where}: holds no message; record it, or give another topic")
-        return self.rows.in_order()
+        return self.rows.in_order(self.where)
 
     def remarks(self) -> list[str]:
         if not self.received:

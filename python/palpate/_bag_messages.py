@@ -22,16 +22,11 @@ _PRESSURES = {
     "xela_server_ros2/msg/SensStream": "sensors.taxels.z",
     "xela_server_ros/msg/SensStream": "sensors.taxels.z",
 }
-#: Where the poses of known types lie.
-_POSES = {
-    "geometry_msgs/msg/Pose": "",
-    "geometry_msgs/msg/PoseStamped": "pose",
-    "geometry_msgs/msg/PoseWithCovariance": "pose",
-    "geometry_msgs/msg/PoseWithCovarianceStamped": "pose.pose",
-    "geometry_msgs/msg/Transform": "",
-    "geometry_msgs/msg/TransformStamped": "transform",
-    "nav_msgs/msg/Odometry": "pose.pose",
-}
+#: Types that hold a pose.
+_POSES = (
+    *(f"geometry_msgs/msg/Pose{what}" for what in ("", "Stamped", "WithCovariance", "WithCovarianceStamped")),
+    "geometry_msgs/msg/Transform", "geometry_msgs/msg/TransformStamped", "nav_msgs/msg/Odometry",
+)  # fmt: skip
 #: Lists of flags beside the readings that say which of them are valid.
 _FLAGS = ("valid", "validity", "is_valid", "mask", "valid_mask")
 #: Kinds of fields in definitions of rosbags: Nodetype.
@@ -120,11 +115,11 @@ class Bag:
         if path is None and msgtype not in _POSES:
             raise Error(
                 f"{where} is no pose; name its field by pose_field, give a topic of "
-                f"{', '.join(sorted(_POSES))}, or frames by tf"
+                f"{', '.join(_POSES)}, or frames by tf"
             )
         if first and first not in (fields := self.fields(msgtype)):
             raise Error(f"{where} has no field {first}; it has {', '.join(fields)}")
-        return Poses(self.name, topic, _POSES[msgtype] if path is None else path, self.has_header(msgtype))
+        return Poses(self.name, topic, path or "", self.has_header(msgtype))
 
     def transforms(self, wanted: list[tuple[str, str]]) -> Transforms:
         """The frames of all topics of transforms, of which these chains are wanted."""
@@ -134,7 +129,15 @@ class Bag:
                 f"{self.name}: tf {':'.join(wanted[0])}: the log has no topic of transforms; give "
                 "pose_topic"
             )
+        if "/tf" in topics:  # of another robot, or of the past, are others
+            topics &= {"/tf", "/tf_static"}
         static = {topic for topic in topics if topic.endswith("tf_static")}
+        robots = {topic.rpartition("/")[0] for topic in topics} - {""}
+        if len(topics - static) > 1 or len(robots) > 1:
+            raise Error(
+                f"{self.name}: tf {':'.join(wanted[0])}: the transforms of {', '.join(sorted(topics))} may be of "
+                "several robots; give a log of one, or pose_topic"
+            )
         return Transforms(self.name, topics, static, wanted)
 
     def read(

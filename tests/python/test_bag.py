@@ -115,7 +115,7 @@ def test_topics_are_listed(log: pathlib.Path) -> None:
         ({"pressure_topic": "/hand"}, "has the lists serial, fingers.taxels; name one by pressure_field"),
         ({"pressure_topic": "/hand", "pressure_field": "taxels"}, "no list of numbers taxels; it has serial"),
         ({"pose_topic": "/hand"}, "/hand: lab_msgs/msg/Hand is no pose"),
-        ({"tf": ("base", "head")}, "no chain of transforms joins these frames; the log has arm, array, base"),
+        ({"tf": ("base", "head")}, "no chain of transforms joins these frames; on /tf, /tf_static are arm, array, base"),
         ({"tf": ("array", "head")}, "tf array:head: no chain"),
         ({"array": (2, 3, 2)}, "has 4 readings a frame for an array of 6 elements; correct array"),
         ({"pose_topic": "/p", "tf": ("a", "b")}, "both say where the sensor is"),
@@ -202,13 +202,16 @@ def test_frames_in_a_gap_of_transforms_have_no_pose(tmp_path: pathlib.Path) -> N
 
 
 def test_frames_come_in_the_order_of_their_times(tmp_path: pathlib.Path) -> None:
-    bag = Bag(tmp_path, "mcap")
-    for i, k in enumerate([3, 0, 7, 1, 2, 9, 4, 8, 5, 6]):
-        finger = bag.of("lab_msgs/msg/Finger", "a", numpy.full(4, k, dtype=numpy.uint16))
-        serial = numpy.array([7, 8], dtype=numpy.int32)
-        bag.write("/hand", bag.of("lab_msgs/msg/Hand", bag.header(START_S + k), serial, [finger]), START_S + i)
-    recording = read_bag(bag.close(), **HAND)
-    assert recording.pressure.tolist() == [[float(k)] * 4 for k in range(10)]
+    def read(step_s: float) -> palpate.Recording:
+        bag = Bag(tmp_path / f"{step_s}", "mcap")
+        for i, k in enumerate([3, 0, 7, 1, 2, 9, 4, 8, 5, 6]):
+            finger = bag.of("lab_msgs/msg/Finger", "a", numpy.full(4, k, dtype=numpy.uint16))
+            hand = bag.of("lab_msgs/msg/Hand", bag.header(START_S + k * step_s), numpy.zeros(2, numpy.int32), [finger])
+            bag.write("/hand", hand, START_S + i)
+        return read_bag(bag.close(), **HAND)
+
+    assert read(0.1).pressure.tolist() == [[float(k)] * 4 for k in range(10)]
+    assert "/hand: the clock steps back from 1700000003.000 to 1700000000.000 s" in error_of(read, 1.0)
 
 
 def test_only_wanted_transforms_are_kept(mcap: pathlib.Path) -> None:

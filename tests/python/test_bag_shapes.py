@@ -13,6 +13,7 @@ from program import run_program
 
 import palpate
 from palpate import read_bag
+from palpate._bag_transforms import row_of_numbers
 from palpate.bag import main, topics
 
 from ros_bag import START_S, Bag, about_z
@@ -150,6 +151,26 @@ def test_what_moves_in_tf_moves(tmp_path: pathlib.Path, still_at_s: float, still
     numpy.testing.assert_allclose(recording.T_robot_sensor[:, 0], [10 * i for i in range(10)], atol=1e-4)
     assert "the frame array is in /tf_static, but moves in /tf: its transforms of /tf are taken" in said
     assert "the frame table" not in said
+
+
+@pytest.mark.parametrize(
+    "edges, words",
+    [
+        ([("/a/tf", 0.0, "base", "array"), ("/b/tf", 0.0, "base", "cup")],
+         "tf base:array: the transforms of /a/tf, /b/tf may be of several robots"),
+        ([("/tf", 0.0, "base", "cup"), ("/tf_old", 0.0, "base", "array")], "no chain of transforms joins these"),
+        ([("/tf", 5.0, "base", "array"), ("/tf", 5.1, "cup", "array"), ("/tf", 5.2, "base", "cup")],
+         "known at any frame's time, 1700000000.000 to 1700000000.900 s: array (whose parent changes) is known from "
+         "1700000005.100 to"),
+    ],
+)  # fmt: skip
+def test_what_transforms_lack_is_said(tmp_path: pathlib.Path, edges: list[Any], words: str) -> None:
+    assert words in error_of(read_frames, tmp_path, [(*edge, 0.1, 0.0) for edge in edges])
+
+
+@pytest.mark.parametrize("numbers, words", [([0, 0, 0, 2], "length is 2,"), ([0.1, 0.1, 0, 0], "length is 0.1414,")])
+def test_no_other_numbers_are_taken_for_a_rotation(numbers: list[float], words: str) -> None:
+    assert words in error_of(row_of_numbers, [0, 0, 0, *numbers])
 
 
 def test_what_other_frames_do_is_not_said(tmp_path: pathlib.Path) -> None:
