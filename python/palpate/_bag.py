@@ -81,7 +81,7 @@ def read_bag(
         tree = bag.transforms([chain for chain in (tf, truth_tf) if chain is not None])
         parts: list[Any] = [*pads, *poses, tree]
         bag.read(parts, progress)
-    time_s, pressures = together([pad.in_order() for pad in pads])
+    time_s, pressures = together(pads)
     at_s = time_s + pose_delay
     pose_time_s, rows = poses[0].in_order() if poses else ((), None)
     truth = None if truth_tf is None else tree.still(*truth_tf, at_s)

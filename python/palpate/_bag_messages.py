@@ -29,6 +29,8 @@ _POSES = (
 )  # fmt: skip
 #: Lists of flags beside the readings that say which of them are valid.
 _FLAGS = ("valid", "validity", "is_valid", "mask", "valid_mask")
+_FLAG = r"'(bool|byte|char|u?int\d+|float\d+)'"  #: kinds of numbers in definitions of rosbags
+_NO_READINGS = ("/MultiArrayDimension", "/Time", "/Duration")
 #: Kinds of fields in definitions of rosbags: Nodetype.
 _NAME, _LISTS = 2, (3, 4)
 #: What mends a log that was cut off.
@@ -68,19 +70,20 @@ class Bag:
         return bool(kind == "std_msgs/msg/Header")
 
     def lists(
-        self, msgtype: str, path: str = "", in_list: bool = False, within: tuple[str, ...] = ()
+        self, msgtype: str, path: str = "", in_list: bool = False, within: tuple[str, ...] = (), flags: str = ""
     ) -> Iterator[tuple[str, str]]:
-        """The dotted paths of lists of numbers, also of one number in each item of a list, and the name of the
-        flags beside each; "" where there are none."""
+        """The dotted paths of lists of numbers, also of one number in each item of a list, and the path of the
+        flags beside each, or beside a list it is in; "" where there are none."""
         fields = self.fields(msgtype)
-        flags = next((name for name in _FLAGS if name in fields), "")
+        own = (name for name in _FLAGS if re.search(_FLAG, str(fields.get(name))))
+        flags = next((f"{path}.{name}".lstrip(".") for name in own), flags)
         for name, (kind, what) in fields.items():
             here = f"{path}.{name}" if path else name
             is_list = kind in _LISTS
             of, inner = what[0] if is_list else (kind, what)
             if of == _NAME:
-                if name != "header" and inner not in within and not inner.endswith("/MultiArrayDimension"):
-                    yield from self.lists(inner, here, is_list, (*within, msgtype))
+                if name != "header" and inner not in within and not inner.endswith(_NO_READINGS):
+                    yield from self.lists(inner, here, is_list or in_list, (*within, msgtype), flags)
             elif (is_list or in_list) and inner[0].startswith(("float", "int", "uint")):
                 yield here, flags
 
@@ -104,9 +107,10 @@ class Bag:
                 f"{where} has no list of numbers"
                 + (f" {path}; it has {', '.join(found)}" if path and found else "; give another topic")
             )
-        flags = found[_without_keys(path)]
-        beside = f"{path.rpartition('.')[0]}.{flags}".lstrip(".") if flags else None
-        return Pressures(self.name, topic, path, self.has_header(msgtype), beside)
+        flags = found[_without_keys(path)].split(".")
+        parts = re.findall(r"[^.[]+(?:\[[^]]*\])?", path)  # whose keys single out the flags, too
+        beside = ".".join([*parts[: len(flags) - 1], flags[-1]])
+        return Pressures(self.name, topic, path, self.has_header(msgtype), beside or None)
 
     def poses(self, topic: str, path: str | None) -> Poses:
         msgtype = self.type_of(topic)

@@ -3,6 +3,7 @@ move although they should not."""
 
 import math
 import pathlib
+import types
 from typing import Any
 
 import numpy
@@ -13,6 +14,7 @@ from program import run_program
 
 import palpate
 from palpate import read_bag
+from palpate._bag_fields import Pressures, _at
 from palpate._bag_transforms import row_of_numbers
 from palpate.bag import main, topics
 
@@ -58,6 +60,28 @@ def test_one_part_of_a_list_is_read(tmp_path: pathlib.Path, key: str, first: int
     assert ("1 readings are unknown by their flags pads" in said) == (first == 20)
 
 
+@pytest.mark.parametrize("key, found", [("2", 2), ("7", 2), ("arm", 2), ("tool", 1), ("tip", "2 items are called so")])
+def test_an_item_is_one(key: str, found: int | str) -> None:
+    of = types.SimpleNamespace
+    pads = [of(name=name, id=number, header=of(frame_id=frame), value=i)
+            for i, (name, number, frame) in enumerate([("tip", 1, "arm"), ("tip", 2, "tool"), ("arm", 7, "arm")])]  # fmt: skip
+    if isinstance(found, str):
+        assert found in error_of(_at, of(pads=pads), f"pads[{key}].value")
+    else:
+        assert _at(of(pads=pads), f"pads[{key}].value") == found
+
+
+@pytest.mark.parametrize("flags, words", [
+    ([True, False], "2 readings are unknown"), ([[1, 0], [0, 0]], "3 readings are unknown"),
+    (False, "4 readings are unknown"), ([1, 0, 1], "1 messages have not as many flags valid as readings"),
+])  # fmt: skip
+def test_a_flag_is_that_of_its_readings(flags: Any, words: str) -> None:
+    pads = Pressures("log", "/pads", "values", False, "valid")
+    pads.add("/pads", types.SimpleNamespace(values=[numpy.array([1, 2]), numpy.array([3, 4])], valid=flags), START_S)
+    assert words in " ".join(pads.remarks())
+    assert "has no list of numbers values" in error_of(pads.add, "/pads", types.SimpleNamespace(q=1), START_S)
+
+
 def test_pads_on_two_topics_are_one_array(tmp_path: pathlib.Path) -> None:
     bag = Bag(tmp_path, "mcap")
     for i in range(4):
@@ -65,8 +89,8 @@ def test_pads_on_two_topics_are_one_array(tmp_path: pathlib.Path) -> None:
         if i < 2:
             bag.plain("/palm", [5 + i], START_S + i + 0.01)
     hand = {"pressure_topic": ["/left", "/palm"], "pressure_field": None, "array": [[-1.0, 0], [1, 0], [9, 0]]}
-    recording = read(bag.close(), **hand)
-    assert recording.pressure[:2].tolist() == [[0, 0, 5], [1, 1, 6]]
+    recording, said = warned(read_bag, bag.close(), **hand)
+    assert recording.pressure[:2].tolist() == [[0, 0, 5], [1, 1, 6]] and "/palm: 2 frames of the first pad" in said
     assert numpy.isnan(recording.pressure[2:, 2]).all(), "the palm is silent"
 
 
@@ -87,8 +111,9 @@ def test_fields_that_a_message_lacks_are_named(tmp_path: pathlib.Path) -> None:
     log = write_states(tmp_path, skewed=3)
     for options, words in (
         ({"pressure_field": "pads[thumb].values"},
-         "/state: pads[thumb].values: [thumb]: no item has this name or frame; the list has left, right"),
-        ({"pressure_field": "pads[2].values"}, "/state: pads[2].values: [2]: the list has 2 items, counted from 0"),
+         "/state: pads[thumb].values: [thumb]: none of the 2 items has this index, counted from 0, name or frame; they "
+         "are called left, right"),
+        ({"pressure_field": "pads.values[0][0]"}, "message 0, counted from 0, has no list of numbers pads.values"),
         ({"pressure_topic": ["/state", "/palm"]}, "no list of numbers pads[left].values"),
         ({"pose_field": "O_T_EE"}, "the matrix of message 3, counted from 0, is no rotation"),
         ({"pose_field": "pads"}, "is no pose, no transform"),
