@@ -87,14 +87,12 @@ class _Messages:
     def add(self, topic: str, message: Any, received_s: float) -> None:
         try:
             row = self._row_of(message)
+            stamped_s = stamp_s(message.header.stamp) if self.has_header else 0.0
         except Error as error:
             raise Error(f"{self.where}: {self.path or 'the message'}: {error}") from None
         except (AttributeError, TypeError):
-            raise Error(
-                f"{self.where}: message {len(self.rows)}, counted from 0, has no list of numbers {self.path}; give "
-                "another field, or topic"
-            ) from None
-        stamped_s = stamp_s(message.header.stamp) if self.has_header else 0.0
+            where = f"{self.where}: message {len(self.rows)}, counted from 0"
+            raise Error(f"{where}, has no list of numbers {self.path}; give another field") from None
         self.received += stamped_s <= 0.0
         self.rows.add(stamped_s, received_s, row)
 
@@ -150,7 +148,7 @@ class Pressures(_Messages):
     def remarks(self) -> list[str]:
         said = (
             (self.invalid, f"readings are unknown by their flags {self.flags}"),
-            (self.unlike, f"messages have not as many flags {self.flags} as readings, so that these are all taken"),
+            (self.unlike, f"messages have not as many flags {self.flags} as readings, which are all taken"),
             (self.far, "frames of the first pad have none of this one within 0.1 s; its readings are unknown there"),
         )
         return super().remarks() + [f"{self.where}: {count} {words}" for count, words in said if count]
@@ -196,6 +194,6 @@ def together(pads: Sequence[Pressures]) -> tuple[Numbers, Numbers]:
         far = numpy.abs(other_s[nearest] - time_s) > 0.1
         pad.far = int(far.sum())
         if far.all():
-            raise Error(f"{pad.where}: none of its frames is within 0.1 s of one of {pads[0].where}; check the clocks")
+            raise Error(f"{pad.where}: no frame is within 0.1 s of one of {pads[0].where}; check the clocks")
         beside.append(numpy.where(far[:, None], numpy.nan, other[nearest]))
     return time_s, numpy.hstack(beside)

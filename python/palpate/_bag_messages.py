@@ -3,6 +3,7 @@
 import contextlib
 import importlib
 import re
+import shlex
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -30,11 +31,13 @@ _POSES = (
 #: Lists of flags beside the readings that say which of them are valid.
 _FLAGS = ("valid", "validity", "is_valid", "mask", "valid_mask")
 _FLAG = r"'(bool|byte|char|u?int\d+|float\d+)'"  #: kinds of numbers in definitions of rosbags
-_NO_READINGS = ("/MultiArrayDimension", "/Time", "/Duration")
+_NO_READINGS = ("/MultiArrayDimension", "/Time", "/Duration")  #: ends of types
 #: Kinds of fields in definitions of rosbags: Nodetype.
 _NAME, _LISTS = 2, (3, 4)
 #: What mends a log that was cut off.
-_MENDED_BY = {".bag": "rosbag reindex {}", ".mcap": "mcap recover {} -o MENDED.mcap"}
+_MENDED_BY = {".bag": "rosbag reindex {}", ".mcap": "mcap recover {} -o MENDED.mcap",
+              ".db3": "sqlite3 {} .recover | sqlite3 MENDED.db3"}  # fmt: skip
+_PACKED = (".zstd", ".zst")
 _TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
@@ -138,10 +141,8 @@ class Bag:
         static = {topic for topic in topics if topic.endswith("tf_static")}
         robots = {topic.rpartition("/")[0] for topic in topics} - {""}
         if len(topics - static) > 1 or len(robots) > 1:
-            raise Error(
-                f"{self.name}: tf {':'.join(wanted[0])}: the transforms of {', '.join(sorted(topics))} may be of "
-                "several robots; give a log of one, or pose_topic"
-            )
+            names = ", ".join(sorted(topics))
+            raise Error(f"{self.name}: {names} may be of several robots; give a log of one, or pose_topic")
         return Transforms(self.name, topics, static, wanted)
 
     def read(
@@ -189,11 +190,20 @@ def _readable(name: str) -> Iterator[None]:
     except Exception as error:  # a damaged bag may fail anywhere in rosbags
         memory = isinstance(error, MemoryError)  # for a length that is damaged, in all likelihood
         why = "a part of it does not fit into memory" if memory else str(error) or type(error).__name__
-        mend = _MENDED_BY.get(Path(name).suffix, "ros2 bag reindex").format(name)
         raise Error(
-            f"{name}: cannot be read as a bag ({why}); copy it again, or, where its recording was cut off, mend "
-            f"it by '{mend}'"
+            f"{name}: cannot be read as a bag ({' '.join(why.split())}); copy it again, or, where its recording "
+            f"was cut off, mend it by: {_mended_by(Path(name), why)}"
         ) from None
+
+
+def _mended_by(log: Path, why: str) -> str:
+    """The command that mends a log, or of a folder, whose metadata are sound, its last file."""
+    files = [file for file in log.glob("*.*") if file.suffix in (*_MENDED_BY, *_PACKED)]
+    log = max(files, default=log) if "metadata" not in why else log
+    if log.suffix in _PACKED:
+        plain = f"UNPACKED{Path(log.stem).suffix}"
+        return f"zstd -dc {shlex.quote(str(log))} > {plain}; {_mended_by(Path(plain), why)}"
+    return _MENDED_BY.get(log.suffix, "ros2 bag reindex {}").format(shlex.quote(str(log)))
 
 
 def _zstd() -> Any:
@@ -224,8 +234,11 @@ def opened(name: str) -> Iterator[Bag]:
     if not path.exists():
         raise Error(f"{name}: no such file or folder; give a bag")
     path = place(path)
+    kind = Path(path.stem).suffix if path.suffix in _PACKED else path.suffix
+    if not path.is_dir() and kind not in _MENDED_BY:
+        raise Error(f"{name}: is no bag; unpack it, or give a .bag, .db3, .mcap or .mcap.zstd file, or a folder")
     with contextlib.ExitStack() as stack:
-        if path.suffix in (".zstd", ".zst"):  # compressed as a whole: a copy is read, which goes
+        if path.suffix in _PACKED:  # compressed as a whole: a copy is read, which goes
             path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / path.stem
             with _readable(name), _zstd().open(name, "rb") as packed, path.open("wb") as plain:
                 shutil.copyfileobj(packed, plain)

@@ -28,9 +28,7 @@ def _row(x: float, y: float, z: float, *quaternion: float) -> tuple[float, ...]:
     if not 0.0 < length < math.inf:
         return _UNKNOWN
     if abs(length - 1.0) > 0.01:
-        raise Error(
-            f"the quaternion's length is {length:.4g}, so that it is no rotation; give x, y, z and w of length 1"
-        )
+        raise Error(f"the quaternion's length is {length:.4g}, so that it is no rotation; give one of length 1")
     return (1e3 * x, 1e3 * y, 1e3 * z, *(part / length for part in quaternion))
 
 
@@ -68,7 +66,7 @@ class Rows:
     def __init__(self) -> None:
         self.time_s = array("d")
         self.latest_s = -math.inf  #: of the stamps
-        self.back: tuple[float, float] | None = None  #: where they first step back
+        self.back = ""  #: where they first step back
         self.numbers = array("d")  #: row by row
 
     def __len__(self) -> int:
@@ -76,8 +74,8 @@ class Rows:
 
     def add(self, stamp_s: float, received_s: float, row: "Sequence[float] | Numbers") -> None:
         """A row at its stamp, or at its reception where it has none."""
-        if 0.0 < stamp_s < self.latest_s - _JITTER_S and self.back is None:
-            self.back = (self.latest_s, stamp_s)
+        if 0.0 < stamp_s < self.latest_s - _JITTER_S and not self.back:
+            self.back = f"from {self.latest_s:.3f} to {stamp_s:.3f} s"
         self.latest_s = max(self.latest_s, stamp_s)
         self.time_s.append(stamp_s if stamp_s > 0.0 else received_s)
         self.numbers.frombytes(numpy.asarray(row, numpy.float64).tobytes())
@@ -85,10 +83,7 @@ class Rows:
     def in_order(self, where: str) -> tuple[Numbers, Numbers]:
         """Times [n], ascending, and their rows. Raises Error where the clock was set back."""
         if self.back:
-            raise Error(
-                f"{where}: the clock steps back from {self.back[0]:.3f} to {self.back[1]:.3f} s; split the log "
-                "there, and read each part"
-            )
+            raise Error(f"{where}: the clock steps back {self.back}; split the log there, and read each part")
         time_s: Numbers = numpy.frombuffer(self.time_s)
         width = len(self.numbers) // max(1, len(self))
         rows: Numbers = numpy.frombuffer(self.numbers).reshape(len(self), width)
@@ -198,7 +193,7 @@ class Transforms:
             if edge.static:
                 edge.rows = Rows()
             if edge.static or self.kept is None or child in self.kept:
-                row = _UNKNOWN
+                row: tuple[float, ...] = _UNKNOWN
                 with contextlib.suppress(Error):  # tf leaves such transforms out, too
                     row = row_of(transform.transform)
                 if not math.isnan(row[3]):
@@ -261,14 +256,12 @@ class Transforms:
             rows[begin : begin + _BLOCK] = _product(_inverse(target_up), source_up)
         if numpy.isnan(rows[:, 0]).all():
             spans = [
-                f"{child}{' (whose parent changes)' * self.edges[child].moved} is known from {at_s[0]:.3f} to "
-                f"{at_s[-1]:.3f} s, in steps of up to {gaps[child]:.3g} s"
-                for child, (at_s, _) in logs.items()
-                if not self.edges[child].static
-            ]
+                f"{child}{' (whose parent changes)' * self.edges[child].moved} is from {t[0]:.3f} to {t[-1]:.3f} s"
+                for child, (t, _) in logs.items() if not self.edges[child].static
+            ]  # fmt: skip
             raise Error(
-                f"{where}: is not known at any frame's time, {time_s[0]:.3f} to {time_s[-1]:.3f} s: "
-                f"{'; '.join(spans)}; check the clocks, or give a larger largest_gap_s"
+                f"{where}: is not known at any frame's time, {time_s[0]:.3f} to {time_s[-1]:.3f} s; "
+                f"{', '.join(spans)}; check the clocks, or give a larger largest_gap_s"
             )
         return rows
 
