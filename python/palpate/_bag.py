@@ -78,7 +78,7 @@ def read_bag(
     for wrong, words in (
         (not names, "pressure_topic: names no topic; give one"),
         (pose_topic is not None and tf, "pose_topic and tf both say where the sensor is; leave one of them out"),
-        (pose_field is not None and pose_topic is None, "pose_field: is of a pose_topic; give pose_topic"),
+        (pose_field is not None and pose_topic is None, "pose_field: is a field of poses; give pose_topic"),
         (mount is not None and unposed, "mount: is for poses; give pose_topic or tf"),
         (truth_tf and unposed, "truth_tf: needs the sensor's poses in the same frame; give pose_topic or tf"),
         (truth_tf and not object, "truth_tf: needs the object's label; give object="),
