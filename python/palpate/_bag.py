@@ -16,6 +16,13 @@ if TYPE_CHECKING:
     from ._bag_messages import Topic
 
 
+def _frames(name: str, frames: tuple[str, str] | str | None) -> tuple[str, str] | None:
+    given = frames.split(":", 1) if isinstance(frames, str) else list(frames or ())
+    if frames is not None and (len(given) != 2 or not all(given)):
+        raise Error(f"{name} {frames}: give two frames, TARGET:SOURCE")
+    return (given[0], given[1]) if given else None
+
+
 def read_bag(
     log: _Path,
     *,
@@ -24,8 +31,8 @@ def read_bag(
     pressure_field: str | None = None,
     pose_topic: str | None = None,
     pose_field: str | None = None,
-    tf: tuple[str, str] | None = None,
-    truth_tf: tuple[str, str] | None = None,
+    tf: tuple[str, str] | str | None = None,
+    truth_tf: tuple[str, str] | str | None = None,
     mount: tuple[float, float, float, float, float, float] | None = None,
     first_element: Literal["bottom-left", "bottom-right", "top-left", "top-right"] = "bottom-left",
     order: Literal["rows", "columns"] = "rows",
@@ -48,7 +55,7 @@ def read_bag(
     is_valid or mask make readings unknown;
     pose_topic: of poses or transforms in metres, or of messages whose pose_field is one, or is a list of a
     position and a quaternion, or of a matrix; or
-    tf: (target, source) frames of /tf and /tf_static, T_target_source, the robot's base and the array;
+    tf: (target, source), frames of /tf and /tf_static, T_target_source, the robot's base and the array;
     truth_tf: (base, object), where the object truly lies, for the recording's truth, which an object that
     moves by more than 1 mm or 1 degree does not have; object: its label. A frame of /tf_static that moves
     in /tf is taken from /tf. mount: x, y, z, roll, pitch, yaw, mm and degrees: where the array sits in the
@@ -64,12 +71,20 @@ def read_bag(
     from ._bag_fields import together
     from ._bag_messages import opened
 
-    if pose_topic is not None and tf is not None:
-        raise Error("pose_topic and tf: both say where the sensor is; leave one of them out")
-    if truth_tf is not None and pose_topic is None and tf is None:
-        raise Error("truth_tf: needs the sensor's poses in the same frame; give pose_topic or tf")
     name = os.fsdecode(log)
     names = [pressure_topic] if isinstance(pressure_topic, str) else list(pressure_topic)
+    tf, truth_tf = _frames("tf", tf), _frames("truth_tf", truth_tf)
+    unposed = pose_topic is None and tf is None
+    for wrong, words in (
+        (not names, "pressure_topic: names no topic; give one"),
+        (pose_topic is not None and tf, "pose_topic and tf both say where the sensor is; leave one of them out"),
+        (pose_field is not None and pose_topic is None, "pose_field: is a field of poses; give pose_topic"),
+        (mount is not None and unposed, "mount: is for poses; give pose_topic or tf"),
+        (truth_tf and unposed, "truth_tf: needs the sensor's poses in the same frame; give pose_topic or tf"),
+        (truth_tf and not object, "truth_tf: needs the object's label; give object="),
+    ):
+        if wrong:
+            raise Error(words)
     source = pose_topic or (":".join(tf) if tf else "")
     options["pressures"] = f"{name}: {', '.join(names)}"
     options["poses"] = f"{name}: {source}" if source else ""
@@ -81,7 +96,7 @@ def read_bag(
         tree = bag.transforms([chain for chain in (tf, truth_tf) if chain is not None])
         parts: list[Any] = [*pads, *poses, tree]
         bag.read(parts, progress)
-    time_s, pressures = together([pad.in_order() for pad in pads])
+    time_s, pressures = together(pads)
     at_s = time_s + pose_delay
     pose_time_s, rows = poses[0].in_order() if poses else ((), None)
     truth = None if truth_tf is None else tree.still(*truth_tf, at_s)

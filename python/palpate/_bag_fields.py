@@ -1,5 +1,6 @@
 """The readings and poses in messages of a log of ROS, by the fields that hold them."""
 
+import functools
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -10,7 +11,7 @@ from ._bag_transforms import Numbers, Rows, row_of, row_of_numbers, stamp_s
 from ._error import Error
 
 #: Fields by which an item of a list is called.
-_NAMES = ("name", "label", "frame_id", "id")
+_NAMES = ("name", "label", "id", "child_frame_id", "frame_id", "header.frame_id")
 
 
 def _without_keys(path: str) -> str:
@@ -18,21 +19,25 @@ def _without_keys(path: str) -> str:
     return re.sub(r"\[[^]]*\]", "", path)
 
 
-def _item(items: Sequence[Any], key: str) -> Any:
-    """The item of this index, or of this name or frame."""
-    if re.fullmatch(r"\d+", key):
-        if int(key) < len(items):
-            return items[int(key)]
-        raise Error(f"[{key}]: the list has {len(items)} items, counted from 0; give another one")
+def _item(items: Any, key: str) -> Any:
+    """The item of this index, else the one of this name, else of this frame."""
+    if not hasattr(items, "__len__") or isinstance(items, str):
+        raise Error(f"[{key}]: is behind a field that is no list; leave it out")
+    if re.fullmatch(r"\d+", key) and int(key) < len(items):
+        return items[int(key)]
     called: list[str] = []
-    for item in items:
-        header = getattr(item, "header", None)
-        names = [getattr(item, name) for name in _NAMES if hasattr(item, name)]
-        names += [header.frame_id] if header is not None else []
-        if key in map(str, names):
-            return item
-        called += map(str, names[:1])
-    raise Error(f"[{key}]: no item has this name or frame; the list has {', '.join(called) or 'no names'}")
+    for name in _NAMES:
+        names = [str(functools.reduce(lambda of, part: getattr(of, part, ""), name.split("."), item))
+                 for item in items]  # fmt: skip
+        if names.count(key) == 1:
+            return items[names.index(key)]
+        if key in names:
+            raise Error(f"[{key}]: {names.count(key)} items are called so; give the index, from 0, of one")
+        called += [name for name in names if name]
+    raise Error(
+        f"[{key}]: none of the {len(items)} items has this index, counted from 0, name or frame; they are called "
+        f"{', '.join(dict.fromkeys(called)) or 'nothing'}"
+    )
 
 
 def _at(message: Any, path: str) -> Any:
@@ -45,7 +50,7 @@ def _at(message: Any, path: str) -> Any:
     match = re.match(r"([^.[]*)(?:\[([^]]*)\])?\.?", path)
     assert match is not None
     field = getattr(message, match[1])
-    return _at(field if match[2] is None else _item(field, match[2]), path[match.end():])
+    return _at(field if not match[2] else _item(field, match[2]), path[match.end():])
 
 
 def _flat(values: Any) -> list[float]:
@@ -54,7 +59,18 @@ def _flat(values: Any) -> list[float]:
         values = values.tolist()
     if isinstance(values, (int, float)):
         return [float(values)]
+    if isinstance(values, str):
+        raise TypeError("no number")
     return [number for value in values for number in _flat(value)]
+
+
+def _spread(flags: Any, values: Any) -> list[float]:
+    """The flags of each of the values, of which one beside several is that of each."""
+    if not hasattr(flags, "__len__"):
+        return _flat(flags) * len(_flat(values))
+    if not isinstance(values, list) or len(flags) != len(values):
+        return _flat(flags)
+    return [number for pair in zip(flags, values) for number in _spread(*pair)]
 
 
 class _Messages:
@@ -71,13 +87,14 @@ class _Messages:
     def add(self, topic: str, message: Any, received_s: float) -> None:
         try:
             row = self._row_of(message)
+            stamped_s = stamp_s(message.header.stamp) if self.has_header else 0.0
         except Error as error:
             raise Error(f"{self.where}: {self.path or 'the message'}: {error}") from None
-        time_s = stamp_s(message.header.stamp) if self.has_header else 0.0
-        if time_s <= 0.0:
-            self.received += 1
-            time_s = received_s
-        self.rows.add(time_s, row)
+        except (AttributeError, TypeError):
+            where = f"{self.where}: message {len(self.rows)}, counted from 0"
+            raise Error(f"{where}, has no list of numbers {self.path}; give another field") from None
+        self.received += stamped_s <= 0.0
+        self.rows.add(stamped_s, received_s, row)
 
     def _row_of(self, message: Any) -> "Sequence[float] | Numbers":
         raise NotImplementedError
@@ -86,7 +103,7 @@ class _Messages:
         """Times [n], ascending, and their rows. Raises Error where there are none."""
         if not len(self.rows):
             raise Error(f"{self.where}: holds no message; record it, or give another topic")
-        return self.rows.in_order()
+        return self.rows.in_order(self.where)
 
     def remarks(self) -> list[str]:
         if not self.received:
@@ -104,6 +121,8 @@ class Pressures(_Messages):
         super().__init__(log, topic, path, has_header)
         self.flags = flags  #: where the flags of valid readings lie
         self.invalid = 0  #: readings
+        self.unlike = 0  #: messages whose flags are not as many as the readings
+        self.far = 0  #: frames of the first pad that none of this one is near
         self.elements = 0
 
     def _row_of(self, message: Any) -> Numbers:
@@ -118,15 +137,21 @@ class Pressures(_Messages):
                 "before; give a topic or a field of one length"
             )
         readings = numpy.array(row, numpy.float64)
-        flags = [] if self.flags is None else _flat(_at(message, self.flags))
+        flags = [] if self.flags is None else _spread(_at(message, self.flags), values)
         if len(flags) == len(readings):
             readings[numpy.array(flags) == 0.0] = numpy.nan
             self.invalid += flags.count(0.0)
+        elif self.flags is not None:
+            self.unlike += 1
         return readings
 
     def remarks(self) -> list[str]:
-        said = f"{self.where}: {self.invalid} readings are unknown by their flags {self.flags}"
-        return super().remarks() + ([said] if self.invalid else [])
+        said = (
+            (self.invalid, f"readings are unknown by their flags {self.flags}"),
+            (self.unlike, f"messages have not as many flags {self.flags} as readings, which are all taken"),
+            (self.far, "frames of the first pad have none of this one within 0.1 s; its readings are unknown there"),
+        )
+        return super().remarks() + [f"{self.where}: {count} {words}" for count, words in said if count]
 
 
 class Poses(_Messages):
@@ -154,17 +179,21 @@ class Poses(_Messages):
         return times, rows[first]
 
 
-def together(pads: Sequence[tuple[Numbers, Numbers]]) -> tuple[Numbers, Numbers]:
+def together(pads: Sequence[Pressures]) -> tuple[Numbers, Numbers]:
     """The frames of several pads as those of one array: at the times of the first, with the nearest frame of
-    each other, whose readings are unknown where that is over 0.1 s away."""
-    (time_s, rows), *others = pads
-    if not others:
+    each other, whose readings are unknown where that is over 0.1 s away. Raises Error where it always is."""
+    time_s, rows = pads[0].in_order()
+    if len(pads) == 1:
         return time_s, rows
     beside = [rows]
-    for other_s, other in others:
+    for pad in pads[1:]:
+        other_s, other = pad.in_order()
         after = numpy.searchsorted(other_s, time_s).clip(max=len(other_s) - 1)
         before = (after - 1).clip(min=0)
         nearest = numpy.where(time_s - other_s[before] < other_s[after] - time_s, before, after)
         far = numpy.abs(other_s[nearest] - time_s) > 0.1
+        pad.far = int(far.sum())
+        if far.all():
+            raise Error(f"{pad.where}: no frame is within 0.1 s of one of {pads[0].where}; check the clocks")
         beside.append(numpy.where(far[:, None], numpy.nan, other[nearest]))
     return time_s, numpy.hstack(beside)

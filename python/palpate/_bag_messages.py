@@ -3,6 +3,7 @@
 import contextlib
 import importlib
 import re
+import shlex
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -22,22 +23,21 @@ _PRESSURES = {
     "xela_server_ros2/msg/SensStream": "sensors.taxels.z",
     "xela_server_ros/msg/SensStream": "sensors.taxels.z",
 }
-#: Where the poses of known types lie.
-_POSES = {
-    "geometry_msgs/msg/Pose": "",
-    "geometry_msgs/msg/PoseStamped": "pose",
-    "geometry_msgs/msg/PoseWithCovariance": "pose",
-    "geometry_msgs/msg/PoseWithCovarianceStamped": "pose.pose",
-    "geometry_msgs/msg/Transform": "",
-    "geometry_msgs/msg/TransformStamped": "transform",
-    "nav_msgs/msg/Odometry": "pose.pose",
-}
+#: Types that hold a pose.
+_POSES = (
+    *(f"geometry_msgs/msg/Pose{what}" for what in ("", "Stamped", "WithCovariance", "WithCovarianceStamped")),
+    "geometry_msgs/msg/Transform", "geometry_msgs/msg/TransformStamped", "nav_msgs/msg/Odometry",
+)  # fmt: skip
 #: Lists of flags beside the readings that say which of them are valid.
 _FLAGS = ("valid", "validity", "is_valid", "mask", "valid_mask")
+_FLAG = r"'(bool|byte|char|u?int\d+|float\d+)'"  #: kinds of numbers in definitions of rosbags
+_NO_READINGS = ("/MultiArrayDimension", "/Time", "/Duration")  #: ends of types
 #: Kinds of fields in definitions of rosbags: Nodetype.
 _NAME, _LISTS = 2, (3, 4)
 #: What mends a log that was cut off.
-_MENDED_BY = {".bag": "rosbag reindex {}", ".mcap": "mcap recover {} -o MENDED.mcap"}
+_MENDED_BY = {".bag": "rosbag reindex {}", ".mcap": "mcap recover {} -o MENDED.mcap",
+              ".db3": "sqlite3 {} .recover | sqlite3 MENDED.db3"}  # fmt: skip
+_PACKED = (".zstd", ".zst")
 _TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
@@ -73,19 +73,20 @@ class Bag:
         return bool(kind == "std_msgs/msg/Header")
 
     def lists(
-        self, msgtype: str, path: str = "", in_list: bool = False, within: tuple[str, ...] = ()
+        self, msgtype: str, path: str = "", in_list: bool = False, within: tuple[str, ...] = (), flags: str = ""
     ) -> Iterator[tuple[str, str]]:
-        """The dotted paths of lists of numbers, also of one number in each item of a list, and the name of the
-        flags beside each; "" where there are none."""
+        """The dotted paths of lists of numbers, also of one number in each item of a list, and the path of the
+        flags beside each, or beside a list it is in; "" where there are none."""
         fields = self.fields(msgtype)
-        flags = next((name for name in _FLAGS if name in fields), "")
+        own = (name for name in _FLAGS if re.search(_FLAG, str(fields.get(name))))
+        flags = next((f"{path}.{name}".lstrip(".") for name in own), flags)
         for name, (kind, what) in fields.items():
             here = f"{path}.{name}" if path else name
             is_list = kind in _LISTS
             of, inner = what[0] if is_list else (kind, what)
             if of == _NAME:
-                if name != "header" and inner not in within and not inner.endswith("/MultiArrayDimension"):
-                    yield from self.lists(inner, here, is_list, (*within, msgtype))
+                if name != "header" and inner not in within and not inner.endswith(_NO_READINGS):
+                    yield from self.lists(inner, here, is_list or in_list, (*within, msgtype), flags)
             elif (is_list or in_list) and inner[0].startswith(("float", "int", "uint")):
                 yield here, flags
 
@@ -109,9 +110,10 @@ class Bag:
                 f"{where} has no list of numbers"
                 + (f" {path}; it has {', '.join(found)}" if path and found else "; give another topic")
             )
-        flags = found[_without_keys(path)]
-        beside = f"{path.rpartition('.')[0]}.{flags}".lstrip(".") if flags else None
-        return Pressures(self.name, topic, path, self.has_header(msgtype), beside)
+        flags = found[_without_keys(path)].split(".")
+        parts = re.findall(r"[^.[]+(?:\[[^]]*\])?", path)  # whose keys single out the flags, too
+        beside = ".".join([*parts[: len(flags) - 1], flags[-1]])
+        return Pressures(self.name, topic, path, self.has_header(msgtype), beside or None)
 
     def poses(self, topic: str, path: str | None) -> Poses:
         msgtype = self.type_of(topic)
@@ -120,11 +122,11 @@ class Bag:
         if path is None and msgtype not in _POSES:
             raise Error(
                 f"{where} is no pose; name its field by pose_field, give a topic of "
-                f"{', '.join(sorted(_POSES))}, or frames by tf"
+                f"{', '.join(_POSES)}, or frames by tf"
             )
         if first and first not in (fields := self.fields(msgtype)):
             raise Error(f"{where} has no field {first}; it has {', '.join(fields)}")
-        return Poses(self.name, topic, _POSES[msgtype] if path is None else path, self.has_header(msgtype))
+        return Poses(self.name, topic, path or "", self.has_header(msgtype))
 
     def transforms(self, wanted: list[tuple[str, str]]) -> Transforms:
         """The frames of all topics of transforms, of which these chains are wanted."""
@@ -134,7 +136,13 @@ class Bag:
                 f"{self.name}: tf {':'.join(wanted[0])}: the log has no topic of transforms; give "
                 "pose_topic"
             )
+        if "/tf" in topics:  # of another robot, or of the past, are others
+            topics &= {"/tf", "/tf_static"}
         static = {topic for topic in topics if topic.endswith("tf_static")}
+        robots = {topic.rpartition("/")[0] for topic in topics} - {""}
+        if len(topics - static) > 1 or len(robots) > 1:
+            names = ", ".join(sorted(topics))
+            raise Error(f"{self.name}: {names} may be of several robots; give a log of one, or pose_topic")
         return Transforms(self.name, topics, static, wanted)
 
     def read(
@@ -182,11 +190,20 @@ def _readable(name: str) -> Iterator[None]:
     except Exception as error:  # a damaged bag may fail anywhere in rosbags
         memory = isinstance(error, MemoryError)  # for a length that is damaged, in all likelihood
         why = "a part of it does not fit into memory" if memory else str(error) or type(error).__name__
-        mend = _MENDED_BY.get(Path(name).suffix, "ros2 bag reindex").format(name)
         raise Error(
-            f"{name}: cannot be read as a bag ({why}); copy it again, or, where its recording was cut off, mend "
-            f"it by '{mend}'"
+            f"{name}: cannot be read as a bag ({' '.join(why.split())}); copy it again, or, where its recording "
+            f"was cut off, mend it by: {_mended_by(Path(name), why)}"
         ) from None
+
+
+def _mended_by(log: Path, why: str) -> str:
+    """The command that mends a log, or of a folder, whose metadata are sound, its last file."""
+    files = [file for file in log.glob("*.*") if file.suffix in (*_MENDED_BY, *_PACKED)]
+    log = max(files, default=log) if "metadata" not in why else log
+    if log.suffix in _PACKED:
+        plain = f"UNPACKED{Path(log.stem).suffix}"
+        return f"zstd -dc {shlex.quote(str(log))} > {plain}; {_mended_by(Path(plain), why)}"
+    return _MENDED_BY.get(log.suffix, "ros2 bag reindex {}").format(shlex.quote(str(log)))
 
 
 def _zstd() -> Any:
@@ -195,6 +212,14 @@ def _zstd() -> Any:
         with contextlib.suppress(ImportError):
             return importlib.import_module(name)
     raise Error("a reader of Zstandard is missing; pip install 'palpate[bag]'")
+
+
+def place(log: Path) -> Path:
+    """What is read of a log: the folder of a file that stands in the folder's metadata.yaml, else itself."""
+    metadata = log.parent / "metadata.yaml"
+    text = metadata.read_text(errors="replace") if metadata.is_file() else ""
+    listed = rf"^\s*-\s+['\"]?(?:.*/)?{re.escape(log.name)}['\"]?\s*$"
+    return log.parent if re.search(listed, text, re.MULTILINE) else log
 
 
 @contextmanager
@@ -208,10 +233,12 @@ def opened(name: str) -> Iterator[Bag]:
     path = Path(name)
     if not path.exists():
         raise Error(f"{name}: no such file or folder; give a bag")
-    if (path.parent / "metadata.yaml").exists() and re.search(r"\.(db3|mcap)(\.zstd?)?$", name):
-        path = path.parent
+    path = place(path)
+    kind = Path(path.stem).suffix if path.suffix in _PACKED else path.suffix
+    if not path.is_dir() and kind not in _MENDED_BY:
+        raise Error(f"{name}: is no bag; unpack it, or give a .bag, .db3, .mcap or .mcap.zstd file, or a folder")
     with contextlib.ExitStack() as stack:
-        if path.suffix in (".zstd", ".zst"):  # compressed as a whole: a copy is read, which goes
+        if path.suffix in _PACKED:  # compressed as a whole: a copy is read, which goes
             path = Path(stack.enter_context(tempfile.TemporaryDirectory())) / path.stem
             with _readable(name), _zstd().open(name, "rb") as packed, path.open("wb") as plain:
                 shutil.copyfileobj(packed, plain)

@@ -1,5 +1,6 @@
 """Poses in space over time, and the tree of frames that /tf and /tf_static give."""
 
+import contextlib
 import math
 from array import array
 from collections.abc import Sequence
@@ -16,28 +17,37 @@ Numbers = NDArray[numpy.float64]  #: poses are [n, 7] mm, and a quaternion x, y,
 _UNKNOWN = (math.nan,) * 7
 _USUAL_GAP_S = 0.1
 _STILL = 1.0  #: mm, and degrees, by which an object that lies still may seem to move
+_JITTER_S = 1.0  #: by which messages may come out of order
 _BLOCK = 1 << 14  #: rows of a chain at a time
 
 
+def _row(x: float, y: float, z: float, *quaternion: float) -> tuple[float, ...]:
+    """A position, m, and a quaternion as a row; NaN where the quaternion is of zeros, as of a robot that does
+    not know. Raises Error where it is no rotation."""
+    length = math.hypot(*quaternion)
+    if not 0.0 < length < math.inf:
+        return _UNKNOWN
+    if abs(length - 1.0) > 0.01:
+        raise Error(f"the quaternion's length is {length:.4g}, so that it is no rotation; give one of length 1")
+    return (1e3 * x, 1e3 * y, 1e3 * z, *(part / length for part in quaternion))
+
+
 def row_of(pose: Any) -> tuple[float, ...]:
-    """A Pose or a Transform, m, as a row of mm and a quaternion; NaN where it is no rotation."""
+    """A Pose or a Transform, m, also within messages that hold one, as a row of mm and a quaternion; NaN where
+    it is not known. Raises Error where it is no rotation."""
+    while (inner := getattr(pose, "pose", getattr(pose, "transform", None))) is not None:
+        pose = inner
     p = pose.position if hasattr(pose, "position") else pose.translation
     q = pose.orientation if hasattr(pose, "orientation") else pose.rotation
-    length = math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
-    if not length > 0.0:
-        return _UNKNOWN
-    x, y, z, w = q.x / length, q.y / length, q.z / length, q.w / length
-    return (1e3 * p.x, 1e3 * p.y, 1e3 * p.z, x, y, z, w)
+    return _row(p.x, p.y, p.z, q.x, q.y, q.z, q.w)
 
 
 def row_of_numbers(values: Sequence[float]) -> tuple[float, ...]:
     """A list as a row: a position, m, and a quaternion x, y, z, w; or 12 or 16 numbers of a homogeneous
-    matrix, by columns or by rows, whichever is a rotation. Raises ValueError where none is, AttributeError of
-    a list of another length."""
+    matrix, by columns or by rows, whichever is a rotation. Raises Error or ValueError where none is,
+    AttributeError of a list of another length."""
     if len(values) == 7:
-        x, y, z, *q = values
-        length = math.hypot(*q)
-        return (1e3 * x, 1e3 * y, 1e3 * z, *(part / length for part in q)) if length > 0.0 else _UNKNOWN
+        return _row(*values)
     if len(values) not in (12, 16):
         raise AttributeError("no pose")
     row = _palpate.row_of_matrix(values)
@@ -55,17 +65,25 @@ class Rows:
 
     def __init__(self) -> None:
         self.time_s = array("d")
+        self.latest_s = -math.inf  #: of the stamps
+        self.back = ""  #: where they first step back
         self.numbers = array("d")  #: row by row
 
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def add(self, time_s: float, row: "Sequence[float] | Numbers") -> None:
-        self.time_s.append(time_s)
+    def add(self, stamp_s: float, received_s: float, row: "Sequence[float] | Numbers") -> None:
+        """A row at its stamp, or at its reception where it has none."""
+        if 0.0 < stamp_s < self.latest_s - _JITTER_S and not self.back:
+            self.back = f"from {self.latest_s:.3f} to {stamp_s:.3f} s"
+        self.latest_s = max(self.latest_s, stamp_s)
+        self.time_s.append(stamp_s if stamp_s > 0.0 else received_s)
         self.numbers.frombytes(numpy.asarray(row, numpy.float64).tobytes())
 
-    def in_order(self) -> tuple[Numbers, Numbers]:
-        """Times [n], ascending, and their rows."""
+    def in_order(self, where: str) -> tuple[Numbers, Numbers]:
+        """Times [n], ascending, and their rows. Raises Error where the clock was set back."""
+        if self.back:
+            raise Error(f"{where}: the clock steps back {self.back}; split the log there, and read each part")
         time_s: Numbers = numpy.frombuffer(self.time_s)
         width = len(self.numbers) // max(1, len(self))
         rows: Numbers = numpy.frombuffer(self.numbers).reshape(len(self), width)
@@ -82,6 +100,7 @@ class _Edge:
     parent: str
     static: bool
     moves: bool = False  #: although /tf_static has it, too
+    moved: bool = False  #: from another parent, whose rows are forgotten
     rows: Rows = field(default_factory=Rows)
 
 
@@ -169,15 +188,16 @@ class Transforms:
                     continue
                 edge = self.edges[child] = _Edge(edge.parent, False, moves=True)
             if edge is None or edge.parent != parent:
-                edge = self.edges[child] = _Edge(parent, static, moves=edge is not None and edge.moves)
+                edge = self.edges[child] = _Edge(parent, static, edge is not None and edge.moves, edge is not None)
                 self._keep_chains()
             if edge.static:
                 edge.rows = Rows()
-                edge.rows.add(0.0, row_of(transform.transform))
-            elif self.kept is None or child in self.kept:
-                row = row_of(transform.transform)
+            if edge.static or self.kept is None or child in self.kept:
+                row: tuple[float, ...] = _UNKNOWN
+                with contextlib.suppress(Error):  # tf leaves such transforms out, too
+                    row = row_of(transform.transform)
                 if not math.isnan(row[3]):
-                    edge.rows.add(stamp_s(transform.header.stamp) or received_s, row)
+                    edge.rows.add(stamp_s(transform.header.stamp), received_s, row)
 
     def _keep_chains(self) -> None:
         """Forgets what the wanted chains do not need, now that a frame has a parent."""
@@ -210,11 +230,13 @@ class Transforms:
         if path is None:
             known = sorted({*self.edges, *(edge.parent for edge in self.edges.values())})
             raise Error(
-                f"{where}: no chain of transforms joins these frames; the log has "
-                f"{', '.join(known) or 'none'}; where the array's mount is not among them, name the frame that "
+                f"{where}: no chain of transforms joins these frames; on {', '.join(sorted(self.topics))} "
+                f"are {', '.join(known) or 'none'}; where the array's mount is not among them, name the frame that "
                 "carries it and give the mount"
             )
-        logs = {child: self.edges[child].rows.in_order() for up in path for child in up}
+        logs = {child: self.edges[child].rows.in_order(f"{where}: {child}") for up in path for child in up}
+        if empty := [child for child, (at_s, _) in logs.items() if not len(at_s)]:
+            raise Error(f"{where}: {empty[0]} has no transform whose quaternion is of length 1; publish one")
         gaps = {child: _gap_s(at_s) if gap_s is None else gap_s for child, (at_s, _) in logs.items()}
 
         def up_to_common(up: list[str], at_s: Numbers) -> Numbers:
@@ -233,7 +255,14 @@ class Transforms:
             source_up, target_up = (up_to_common(up, at_s) for up in path)
             rows[begin : begin + _BLOCK] = _product(_inverse(target_up), source_up)
         if numpy.isnan(rows[:, 0]).all():
-            raise Error(f"{where}: is not known at any frame's time; check the clocks")
+            spans = [
+                f"{child}{' (whose parent changes)' * self.edges[child].moved} is from {t[0]:.3f} to {t[-1]:.3f} s"
+                for child, (t, _) in logs.items() if not self.edges[child].static
+            ]  # fmt: skip
+            raise Error(
+                f"{where}: is not known at any frame's time, {time_s[0]:.3f} to {time_s[-1]:.3f} s; "
+                f"{', '.join(spans)}; check the clocks, or give a larger largest_gap_s"
+            )
         return rows
 
     def poses(self, target: str, source: str, time_s: Numbers, gap_s: float | None) -> Numbers:

@@ -5,6 +5,7 @@
 
 import argparse
 import os
+import pathlib
 import re
 import sys
 import warnings
@@ -14,7 +15,7 @@ import numpy
 
 from ._bag import read_bag, topics
 from ._bag_fields import _at, _flat
-from ._bag_messages import _PRESSURES
+from ._bag_messages import _PRESSURES, place
 from ._bag_transforms import stamp_s as stamp_s
 from ._error import Error
 
@@ -67,25 +68,16 @@ def _flag_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _frames(flag: str, text: str | None) -> tuple[str, str] | None:
-    if text is None:
-        return None
-    target, _, source = text.partition(":")
-    if not target or not source:
-        raise Error(f"{flag} {text}: give two frames, TARGET:SOURCE")
-    return target, source
-
-
 def _in_flags(message: str, parser: argparse.ArgumentParser) -> str:
     """The message with options as flags, where it has Python's keywords: "tf=", "pressure_field"."""
     for action in parser._actions:
         if not action.option_strings:
             continue
         name, flag = action.dest, action.option_strings[-1]
-        # Some keywords are words of their own, too.
-        ends = r"\b=?" if "_" in name or name == "tf" else r"(?:=|(?=:))"
+        # Some keywords are words of their own, too, and some a field's or a frame's name.
+        ends = r"\b=?(?!:)" if "_" in name or name == "tf" else "="
         message = re.sub(rf"(?<![\w/:-]){name}=(?:'([^']*)'|(?=[\w(]))", rf"{flag} \1", message)
-        message = re.sub(rf"(?<![\w/:-]){name}{ends}", flag, message)
+        message = re.sub(rf"^{name}(?=:)|(?<![\w/:-]){name}{ends}", flag, message)
     return message
 
 
@@ -112,15 +104,15 @@ def _run(arguments: argparse.Namespace) -> None:
     folder = os.path.dirname(arguments.output) or "."
     if os.path.isdir(arguments.output) or not os.access(folder, os.W_OK):
         raise Error(f"-o {arguments.output}: cannot be written; give a file in a folder that exists")
+    output, log = pathlib.Path(arguments.output), place(pathlib.Path(arguments.log))
+    files = [(file, "LOG") for file in (log, *log.glob("*")) if file.suffix != ".h5"]  # recordings may lie there
+    for file, reader in (*files, (pathlib.Path(arguments.array), "--array")):
+        if output.exists() and file.exists() and output.samefile(file):
+            raise Error(f"-o {output}: would overwrite {file}, which {reader} reads; choose another name")
     shown = sys.stderr.isatty()
-    options = vars(arguments) | {
-        "pressure_topic": arguments.pressure_topic.split(","),
-        "tf": _frames("--tf", arguments.tf),
-        "truth_tf": _frames("--truth-tf", arguments.truth_tf),
-        "progress": _show_progress if shown else None,
-    }
-    output = options.pop("output")
-    del options["list"]
+    options = vars(arguments) | {"progress": _show_progress if shown else None}
+    options["pressure_topic"] = arguments.pressure_topic.split(",")
+    del options["list"], options["output"]
     recording = read_bag(**options)
     if shown:
         print(_CLEAR, end="", file=sys.stderr)
@@ -146,6 +138,9 @@ def main() -> int:
     except (Error, OSError) as error:
         say(error)
         return 1 if getattr(error, "fault", "input") == "system" else 2
+    except KeyboardInterrupt:
+        say("interrupted")
+        return 130
     return 0
 
 

@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 from typing import Any
+from unittest import mock
 
 import numpy
 import pytest
@@ -16,7 +17,7 @@ from program import run_program
 
 import palpate
 from palpate import _bag_messages, _bag_transforms, read_bag
-from palpate.bag import main, topics
+from palpate.bag import _flag_parser, _in_flags, main, topics
 
 from ros_bag import START_S, Bag, about_z, pointing_down
 
@@ -115,10 +116,17 @@ def test_topics_are_listed(log: pathlib.Path) -> None:
         ({"pressure_topic": "/hand"}, "has the lists serial, fingers.taxels; name one by pressure_field"),
         ({"pressure_topic": "/hand", "pressure_field": "taxels"}, "no list of numbers taxels; it has serial"),
         ({"pose_topic": "/hand"}, "/hand: lab_msgs/msg/Hand is no pose"),
-        ({"tf": ("base", "head")}, "no chain of transforms joins these frames; the log has arm, array, base"),
+        ({"tf": ("base", "head")}, "joins these frames; on /tf, /tf_static are arm, array, base"),
         ({"tf": ("array", "head")}, "tf array:head: no chain"),
         ({"array": (2, 3, 2)}, "has 4 readings a frame for an array of 6 elements; correct array"),
         ({"pose_topic": "/p", "tf": ("a", "b")}, "both say where the sensor is"),
+        ({"tf": "base"}, "tf base: give two frames"),
+        ({"tf": ("base", "arm", "array")}, "tf ('base', 'arm', 'array'): give two frames"),
+        ({"pressure_topic": "/tf", "pressure_field": "transforms[].transform.rotation.w"}, "has 1 readings"),
+        ({"pressure_topic": []}, "pressure_topic: names no topic"),
+        ({"tf": "base:array", "pose_field": "pose"}, "pose_field: is a field of poses; give pose_topic"),
+        ({"tf": "base:array", "truth_tf": "base:cup"}, "truth_tf: needs the object's label"),
+        ({"mount": (0, 0, 0, 0, 0, 0)}, "mount: is for poses; give pose_topic or tf"),
         ({"tf": ("base", "array"), "pose_delay": math.nan}, "pose_delay="),
         ({"tf": ("base", "array"), "largest_gap_s": -1.0}, "largest_gap_s="),
     ],
@@ -126,7 +134,7 @@ def test_topics_are_listed(log: pathlib.Path) -> None:
 def test_what_a_log_lacks_is_said(log: pathlib.Path, options: dict[str, Any], words: str) -> None:
     said = error_of(read_bag, log, **{**PLAIN, **options})
     assert words in said
-    assert said.startswith(f"{log}: ") or "pose_topic" in said or "give seconds" in said
+    assert said.startswith((f"{log}: ", *options)) or "give seconds" in said
 
 
 @pytest.mark.parametrize("storage", ["bag", "mcap"])
@@ -202,13 +210,16 @@ def test_frames_in_a_gap_of_transforms_have_no_pose(tmp_path: pathlib.Path) -> N
 
 
 def test_frames_come_in_the_order_of_their_times(tmp_path: pathlib.Path) -> None:
-    bag = Bag(tmp_path, "mcap")
-    for i, k in enumerate([3, 0, 7, 1, 2, 9, 4, 8, 5, 6]):
-        finger = bag.of("lab_msgs/msg/Finger", "a", numpy.full(4, k, dtype=numpy.uint16))
-        serial = numpy.array([7, 8], dtype=numpy.int32)
-        bag.write("/hand", bag.of("lab_msgs/msg/Hand", bag.header(START_S + k), serial, [finger]), START_S + i)
-    recording = read_bag(bag.close(), **HAND)
-    assert recording.pressure.tolist() == [[float(k)] * 4 for k in range(10)]
+    def read(step_s: float) -> palpate.Recording:
+        bag = Bag(tmp_path / f"{step_s}", "mcap")
+        for i, k in enumerate([3, 0, 7, 1, 2, 9, 4, 8, 5, 6]):
+            finger = bag.of("lab_msgs/msg/Finger", "a", numpy.full(4, k, dtype=numpy.uint16))
+            hand = bag.of("lab_msgs/msg/Hand", bag.header(START_S + k * step_s), numpy.zeros(2, numpy.int32), [finger])
+            bag.write("/hand", hand, START_S + i)
+        return read_bag(bag.close(), **HAND)
+
+    assert read(0.1).pressure.tolist() == [[float(k)] * 4 for k in range(10)]
+    assert "/hand: the clock steps back from 1700000003.000 to 1700000000.000 s" in error_of(read, 1.0)
 
 
 def test_only_wanted_transforms_are_kept(mcap: pathlib.Path) -> None:
@@ -267,9 +278,11 @@ def test_a_log_that_is_cut_off_or_not_there_is_said(tmp_path: pathlib.Path, mcap
     assert "log.bag: cannot be read as a bag" in error_of(topics, log)
     [storage] = mcap.glob("*.mcap")
     whole = storage.read_bytes()
+    storage.with_name("other.mcap").write_bytes(whole[:200])
+    assert "other.mcap: cannot be read as a bag" in error_of(topics, storage.with_name("other.mcap")), "not its folder"
     storage.write_bytes(whole[:200])
     assert "mcap: cannot be read as a bag" in error_of(topics, mcap)
-    assert f"mend it by 'mcap recover {storage} -o" in error_of(topics, storage)
+    assert f"mend it by: mcap recover {storage} -o" in error_of(topics, storage)
     storage.write_bytes(whole[:9] + struct.pack("<Q", 1 << 62) + whole[17:])  # the length of the first record
     assert "mcap: cannot be read as a bag (a part of it does not fit" in error_of(topics, mcap)
     assert "none.bag: no such file" in error_of(topics, tmp_path / "none.bag")
@@ -286,6 +299,10 @@ def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_pa
     assert "10 frames of 4 elements, 10 with a pose; next: palpate touches" in done.out
     assert "palpate.bag: " in done.err
     expect_poses(palpate.read_recording(file))
+    with mock.patch("palpate.bag.topics", side_effect=KeyboardInterrupt):
+        assert run(mcap, "--list").status == 130
+    for said in ("log: /s: list: is no pose", "log: array:base: turned out of the robot's xy plane: x is"):
+        assert _in_flags(said, _flag_parser()) == said, "no flag stands in it"
     unposed = run(mcap, *flags[:4], "-o", tmp_path / "unposed.h5")
     assert "none with a pose, as neither --tf nor --pose-topic is given" in unposed.out
     for arguments, words in (
@@ -293,6 +310,8 @@ def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_pa
         ((mcap, *flags), "--output: missing"),
         ((mcap, *flags, "--tf", "base", "-o", file), "--tf base: give two frames, TARGET:SOURCE"),
         ((tmp_path / "none.bag", "--list"), "none.bag: no such file"),
+        ((mcap, *flags, "-o", mcap / "metadata.yaml"), "metadata.yaml, which LOG reads; choose another name"),
+        ((mcap, *flags, "--array", file, "-o", file), "f.h5, which --array reads; choose another name"),
         ((mcap, *flags, "-o", tmp_path), ": cannot be written; give a file in a folder that exists"),
         ((mcap, *flags, "-o", tmp_path / "none" / "f.h5"), ": cannot be written; give a file"),
         ((mcap, *flags, "--dead", "auto", "-o", file), "--dead auto: 'auto' is no element"),

@@ -3,6 +3,7 @@ move although they should not."""
 
 import math
 import pathlib
+import types
 from typing import Any
 
 import numpy
@@ -13,6 +14,8 @@ from program import run_program
 
 import palpate
 from palpate import read_bag
+from palpate._bag_fields import Pressures, _item
+from palpate._bag_transforms import row_of_numbers
 from palpate.bag import main, topics
 
 from ros_bag import START_S, Bag, about_z
@@ -57,6 +60,25 @@ def test_one_part_of_a_list_is_read(tmp_path: pathlib.Path, key: str, first: int
     assert ("1 readings are unknown by their flags pads" in said) == (first == 20)
 
 
+@pytest.mark.parametrize("key, found", [("2", 2), ("7", 2), ("arm", 2), ("tool", 1)])
+def test_an_item_is_one(key: str, found: int) -> None:
+    names = [("tip", 1, "arm"), ("tip", 2, "tool"), ("arm", 7, "arm")]
+    pads = [types.SimpleNamespace(name=name, id=number, frame_id=frame) for name, number, frame in names]
+    assert _item(pads, key) is pads[found]
+    assert "2 items are called so" in error_of(_item, pads, "tip")
+
+
+@pytest.mark.parametrize("flags, words", [
+    ([True, False], "2 readings are unknown"), ([[1, 0], [0, 0]], "3 readings are unknown"),
+    (False, "4 readings are unknown"), ([1, 0, 1], "1 messages have not as many flags valid as readings"),
+])  # fmt: skip
+def test_a_flag_is_that_of_its_readings(flags: Any, words: str) -> None:
+    pads = Pressures("log", "/pads", "values", False, "valid")
+    pads.add("/pads", types.SimpleNamespace(values=[numpy.array([1, 2]), numpy.array([3, 4])], valid=flags), START_S)
+    assert words in " ".join(pads.remarks())
+    assert "has no list of numbers values" in error_of(pads.add, "/pads", types.SimpleNamespace(q=1), START_S)
+
+
 def test_pads_on_two_topics_are_one_array(tmp_path: pathlib.Path) -> None:
     bag = Bag(tmp_path, "mcap")
     for i in range(4):
@@ -64,8 +86,8 @@ def test_pads_on_two_topics_are_one_array(tmp_path: pathlib.Path) -> None:
         if i < 2:
             bag.plain("/palm", [5 + i], START_S + i + 0.01)
     hand = {"pressure_topic": ["/left", "/palm"], "pressure_field": None, "array": [[-1.0, 0], [1, 0], [9, 0]]}
-    recording = read(bag.close(), **hand)
-    assert recording.pressure[:2].tolist() == [[0, 0, 5], [1, 1, 6]]
+    recording, said = warned(read_bag, bag.close(), **hand)
+    assert recording.pressure[:2].tolist() == [[0, 0, 5], [1, 1, 6]] and "/palm: 2 frames of the first pad" in said
     assert numpy.isnan(recording.pressure[2:, 2]).all(), "the palm is silent"
 
 
@@ -86,8 +108,9 @@ def test_fields_that_a_message_lacks_are_named(tmp_path: pathlib.Path) -> None:
     log = write_states(tmp_path, skewed=3)
     for options, words in (
         ({"pressure_field": "pads[thumb].values"},
-         "/state: pads[thumb].values: [thumb]: no item has this name or frame; the list has left, right"),
-        ({"pressure_field": "pads[2].values"}, "/state: pads[2].values: [2]: the list has 2 items, counted from 0"),
+         "/state: pads[thumb].values: [thumb]: none of the 2 items has this index, counted from 0, name or frame; "
+         "they are called left, right"),
+        ({"pressure_field": "pads.values[0][0]"}, "message 0, counted from 0, has no list of numbers pads.values"),
         ({"pressure_topic": ["/state", "/palm"]}, "no list of numbers pads[left].values"),
         ({"pose_field": "O_T_EE"}, "the matrix of message 3, counted from 0, is no rotation"),
         ({"pose_field": "pads"}, "is no pose, no transform"),
@@ -97,6 +120,7 @@ def test_fields_that_a_message_lacks_are_named(tmp_path: pathlib.Path) -> None:
         poses = {} if "pressure_topic" in options else {"pose_topic": "/state"}
         poses |= {"pose_field": "tool"} if "pressure_field" in options else {}
         assert words in error_of(read_bag, log, **{**STATE, **poses, **options})
+    assert "the quaternion's length is 2, so" in error_of(row_of_numbers, [0, 0, 0, 0, 0, 0, 2])
 
 
 def test_a_compressed_file_is_read_and_a_cut_one_told_how_to_be_mended(tmp_path: pathlib.Path) -> None:
@@ -108,9 +132,14 @@ def test_a_compressed_file_is_read_and_a_cut_one_told_how_to_be_mended(tmp_path:
     assert [topic.name for topic in topics(packed)] == ["/palm", "/state"]
     alone.write_bytes(file.read_bytes()[:-300])
     said = error_of(read_bag, alone, **STATE)
-    assert "log.mcap: cannot be read as a bag " in said and f"'mcap recover {alone} -o" in said
+    assert "log.mcap: cannot be read as a bag " in said and f": mcap recover {alone} -o" in said
+    packed = packed.rename(tmp_path / "my log.mcap.zstd")
     packed.write_bytes(zstd.compress(file.read_bytes())[:-100])
-    assert "log.mcap.zstd: cannot be read as a bag" in error_of(read_bag, packed, **STATE)
+    said = error_of(read_bag, packed, **STATE)
+    assert f"zstd -dc '{packed}' > UNPACKED.mcap; mcap recover UNPACKED.mcap -o" in said
+    assert "log.tar: is no bag; unpack it" in error_of(read_bag, alone.rename(tmp_path / "log.tar"), **STATE)
+    file.write_bytes(file.read_bytes()[:-300])
+    assert f"mend it by: mcap recover {file} -o" in error_of(read_bag, file.parent, **STATE)
 
 
 def test_the_program_takes_them(tmp_path: pathlib.Path) -> None:
@@ -150,6 +179,16 @@ def test_what_moves_in_tf_moves(tmp_path: pathlib.Path, still_at_s: float, still
     numpy.testing.assert_allclose(recording.T_robot_sensor[:, 0], [10 * i for i in range(10)], atol=1e-4)
     assert "the frame array is in /tf_static, but moves in /tf: its transforms of /tf are taken" in said
     assert "the frame table" not in said
+
+
+@pytest.mark.parametrize("edges, words", [
+    ([("/a/tf", 0, "base", "array"), ("/b/tf", 0, "base", "cup")], "/a/tf, /b/tf may be of several robots"),
+    ([("/tf", 0, "base", "cup"), ("/tf_old", 0, "base", "array")], "joins these frames; on /tf are base, cup"),
+    ([("/tf", 5, "base", "array"), ("/tf", 6, "cup", "array"), ("/tf", 7, "base", "cup")],
+     "time, 1700000000.000 to 1700000000.900 s; array (whose parent changes) is from 1700000006.000"),
+])  # fmt: skip
+def test_what_transforms_lack_is_said(tmp_path: pathlib.Path, edges: list[Any], words: str) -> None:
+    assert words in error_of(read_frames, tmp_path, [(*edge, 0.1, 0.0) for edge in edges])
 
 
 def test_what_other_frames_do_is_not_said(tmp_path: pathlib.Path) -> None:
