@@ -12,6 +12,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "model/body_spread.hpp"
 #include "model/displacement_points.hpp"
 #include "recognition/belief_cells.hpp"
 
@@ -130,13 +131,12 @@ ObjectPose pose_of(const Moments& moments, const BinnedObject& of) {
   return pose;
 }
 
-/// The lower triangle L of L L^T, for a covariance given row by row; axes without variance have
-/// none.
-glm::dmat3 cholesky(const std::array<double, 9>& covariance) {
+/// The lower triangle L of L L^T, for a covariance; axes without variance have none.
+glm::dmat3 cholesky(const glm::dmat3& covariance) {
   glm::dmat3 lower{0.0};  // by columns
   for (int j = 0; j < 3; ++j) {
     for (int i = j; i < 3; ++i) {
-      double rest = covariance[3 * i + j];
+      double rest = covariance[j][i];
       for (int k = 0; k < j; ++k) {
         rest -= lower[k][i] * lower[k][j];
       }
@@ -247,15 +247,17 @@ std::vector<PartAway> spread_between_bins(const BinnedObject& of, std::vector<Pa
   constexpr std::size_t points = 512;  // standard error of a share of 95 %: below 0.01
   const double near = share_within(parts, neighbourhood_mm);
   std::erase_if(parts, [](const PartAway& part) { return part.mm <= neighbourhood_mm; });
-  const glm::dmat3 factor = cholesky(refined.covariance);
+  // About the body: the robot's origin may lie far away.
+  const glm::dmat3 factor = cholesky(motion_covariance(of.body, inverse(refined)));
   PlacedBody body(of);
   const PlacedBody::Place from = body.at(refined.T_object_robot);
   static const std::vector<Pose> normals = displacement_points({.mm = 1.0, .rad = 1.0}, points);
   for (const Pose& normal : normals) {
     const glm::dvec3 off = factor * glm::dvec3(normal.translation_mm, normal.theta_rad);
-    const Pose at{refined.T_object_robot.translation_mm + glm::dvec2(off),
-                  refined.T_object_robot.theta_rad + off.z};
-    parts.push_back({body.apart_mm(from, body.at(at)), near / static_cast<double>(points)});
+    PlacedBody::Place at = from;
+    at.centroid_mm += glm::dvec2(off);
+    at.theta_rad += off.z / spin_mm(of.body);
+    parts.push_back({body.apart_mm(from, at), near / static_cast<double>(points)});
   }
   return parts;
 }

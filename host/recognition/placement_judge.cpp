@@ -121,11 +121,10 @@ class Explainer {
     double largest = log_zero;
     std::size_t after = 0;
     std::array<PlacedPeak, 2> parts;
-    std::size_t in_contact = 0;
-    for (std::size_t k = 1; k < n; ++k) {
-      in_contact += touches_[k - 1].in_contact() ? 1 : 0;
+    const auto split = [&](std::size_t k) {
+      const std::size_t in_contact = touches_in_contact(touches_.first(k));
       if (in_contact < fewest_in_contact || question_.in_contact - in_contact < fewest_in_contact) {
-        continue;
+        return;
       }
       const PlacedPeak a = placed_.climb(starts.before[k].T_object_robot, at, {0, k}, 1.0);
       const PlacedPeak b = placed_.climb(starts.from[k].T_object_robot, at, {k, n}, 1.0);
@@ -133,6 +132,18 @@ class Explainer {
         largest = a.nats + b.nats;
         after = k;
         parts = {a, b};
+      }
+    };
+    // Of many touches some splits are tried, and all about the best of these.
+    constexpr std::size_t most_splits = 64;
+    const std::size_t step = std::max<std::size_t>(1, n / most_splits);
+    for (std::size_t k = 1; k < n; k += step) {
+      split(k);
+    }
+    const std::size_t best = after;
+    for (std::size_t k = std::max(best, step) - step + 1; k < std::min(n, best + step); ++k) {
+      if (best > 0 && step > 1) {
+        split(k);
       }
     }
     if (after == 0) {

@@ -74,6 +74,9 @@ TouchEvidence TouchPlaces::thinned(const TouchEvidence& touch, double weight) co
 }
 
 TouchEvidence TouchPlaces::add(const TouchEvidence& touch) {
+  if (!touch.tells()) {
+    return touch;  // it takes no weight from others
+  }
   Place place = place_of(touch);
   place.weight = weight_of(place, touch);
   if (touch.in_contact()) {

@@ -250,10 +250,15 @@ RecognitionStep take_step(Recogniser& recogniser, const RecognitionTask& task,
   step.decision = decide(step, task);
 
   step.warnings = warnings_about(evidence, task, recogniser.lattice(), step);
+  // What is wrong with the input may explain a poor result; before a robot acts, places are
+  // doubted.
+  const bool doubtful = step.warnings.empty() || step.decision.act;
   if (step.warnings.empty()) {
     if (auto warning = turned_alike(task, step)) {
       step.warnings.push_back(*std::move(warning));
     }
+  }
+  if (doubtful) {
     doubt_places(recogniser, estimate, task, step);
   }
   if (std::string words = recogniser.place_words(); !words.empty()) {
