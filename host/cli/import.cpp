@@ -76,8 +76,8 @@ void print_summary(const ImportArguments& options, const ImportedRecording& impo
   if (imported.holds_poses && options.poses.empty()) {
     fmt::print(", its columns of poses left out (--poses {})", options.pressures);
   }
-  if (imported.assumed_units) {
-    fmt::print(", poses taken to be in mm and rad");
+  if (!imported.assumed_units.empty()) {
+    fmt::print(", {}", imported.assumed_units);
   }
   if (imported.whole_up_to) {
     fmt::print(", readings are whole numbers up to {:.0f}: raw? (--pressure-unit raw)",

@@ -300,10 +300,17 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
   const auto [time, pose] = find_columns(table, options);
   PoseTable poses;
   const bool is_planar = pose.form == PoseForm::planar;
-  for (std::size_t i = 0; i < (is_planar ? 3 : 2); ++i) {
-    poses.units[i] = pose.columns[i].unit;
-    poses.assumed_units = poses.assumed_units || pose.columns[i].assumed;
+  const bool has_angles = pose.form == PoseForm::euler || pose.form == PoseForm::rotation_vector;
+  if ((!options.euler.empty() && !has_angles) ||
+      (!options.matrix.empty() && pose.form != PoseForm::matrix)) {
+    refuse(path,
+           "its poses are of another form than `euler` or `matrix` is for; leave it out, or "
+           "name other columns by `pose-columns`");
   }
+  const Unit angle_unit = is_planar || has_angles ? pose.columns.back().unit : angle_units[0];
+  poses.units = {pose.columns[0].unit, pose.columns[1].unit,
+                 given_unit(options, angle_units).value_or(angle_unit)};
+  poses.assumed_units = assumed_words(table, pose.columns);
   // Poses of x, y and an angle leave out the height and rotations out of the plane.
   std::vector<UnitColumn> rotations;
   if (is_planar) {

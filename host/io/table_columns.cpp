@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <iterator>
+#include <set>
 
 #include <fmt/ranges.h>
 
@@ -12,9 +13,6 @@
 namespace palpate {
 
 namespace {
-
-constexpr Unit metres[] = {{"m", 1e3, 1.0}};
-constexpr Unit radians[] = {{"rad"}};
 
 /// A quantity that columns hold, with its usual names, separated by blanks, and its units.
 struct Quantity {
@@ -54,6 +52,9 @@ std::vector<Quantity> quantities_of(PoseForm form) {
   return std::vector<Quantity>(16, position[0]);
 }
 
+/// Units that tables may have, and that are not read.
+constexpr Unit other_units[] = {{"cm"}, {"um"}, {"in"}, {"inch"}, {"min"}, {"h"}, {"mrad"}};
+
 /// Names of units that stand for the units above.
 constexpr std::pair<std::string_view, std::string_view> spellings[] = {
     {"sec", "s"},   {"seconds", "s"},   {"msec", "ms"},     {"µs", "us"},
@@ -89,11 +90,19 @@ NameParts parts_of(std::string_view name, std::span<const Unit> units) {
   return unit ? NameParts{name.substr(0, line), unit} : NameParts{name, {}};
 }
 
-/// The columns whose names are `stem` and so many numbers from 0 on, as robots name the parts of a
-/// pose: in metres and radians.
-std::vector<UnitColumn> counted_columns(const CsvTable& table, std::string_view stem,
-                                        std::size_t count) {
-  std::vector<UnitColumn> columns;
+// Universal Robots' RTDE and libfranka name the parts of a pose by a stem and numbers from 0 on,
+// and log them in metres and radians.
+constexpr std::string_view universal_robots = "actual_TCP_pose";
+constexpr std::string_view libfranka = "O_T_EE";
+
+bool begins_with(std::string_view name, std::string_view stem) {
+  return alike(name.substr(0, stem.size()), stem);
+}
+
+/// The columns whose names are `stem` and so many numbers from 0 on.
+std::vector<std::size_t> counted_columns(const CsvTable& table, std::string_view stem,
+                                         std::size_t count) {
+  std::vector<std::size_t> columns;
   for (std::size_t i = 0; i < count; ++i) {
     std::optional<std::size_t> found;
     for (const char* form : {"{}_{}", "{}[{}]", "{}{}", "{}.{}"}) {
@@ -102,39 +111,30 @@ std::vector<UnitColumn> counted_columns(const CsvTable& table, std::string_view 
     if (!found) {
       return {};
     }
-    columns.push_back({.index = *found, .unit = i < 3 ? metres[0] : radians[0]});
+    columns.push_back(*found);
   }
   return columns;
 }
 
-/// The columns that have the usual names of a pose of this form; none unless the table has all.
-std::vector<UnitColumn> usual_columns(const CsvTable& table, PoseForm form,
-                                      const TableOptions& options) {
-  std::vector<UnitColumn> columns;
-  for (const Quantity& quantity : quantities_of(form)) {
-    const auto column = find_column(table, quantity.names, quantity.units, options);
-    if (!column) {
-      return {};
-    }
-    columns.push_back(*column);
-  }
-  return columns;
-}
-
+/// The columns that have the usual names of one form; none unless the table has all.
 PoseColumns usual_pose(const CsvTable& table, const TableOptions& options) {
   for (const PoseForm form :
        {PoseForm::euler, PoseForm::planar, PoseForm::quaternion, PoseForm::rotation_vector}) {
-    if (auto columns = usual_columns(table, form, options); !columns.empty()) {
-      return {form, std::move(columns)};
+    const std::vector<Quantity> quantities = quantities_of(form);
+    PoseColumns pose{form, {}};
+    for (const Quantity& quantity : quantities) {
+      if (const auto column = find_column(table, quantity.names, quantity.units, options)) {
+        pose.columns.push_back(*column);
+      }
+    }
+    if (pose.columns.size() == quantities.size()) {
+      return pose;
     }
   }
-  // Universal Robots' RTDE, and libfranka.
-  if (auto columns = counted_columns(table, "actual_TCP_pose", 6); !columns.empty()) {
-    return {PoseForm::rotation_vector, std::move(columns)};
+  if (const auto columns = counted_columns(table, universal_robots, 6); !columns.empty()) {
+    return pose_columns(table, PoseForm::rotation_vector, columns, options);
   }
-  PoseColumns pose{PoseForm::matrix, counted_columns(table, "O_T_EE", 16)};
-  std::ranges::for_each(pose.columns, [](UnitColumn& column) { column.unit = metres[0]; });
-  return pose;
+  return pose_columns(table, PoseForm::matrix, counted_columns(table, libfranka, 16), options);
 }
 
 PoseColumns named_pose(const CsvTable& table, const TableOptions& options) {
@@ -246,14 +246,40 @@ UnitColumn unit_column(const CsvTable& table, std::size_t index, std::span<const
   const std::string& name = table.columns()[index];
   const std::optional<Unit> named = parts_of(name, units).unit;
   const std::optional<Unit> given = given_unit(options, units);
-  if (named && given && named->name != given->name) {
+  const bool is_time = units.data() == time_units.data();
+  const char* const option = is_time ? "time-unit" : "pose-unit";
+  // With two tables, the unit of times may be meant for the other one.
+  if (named && given && named->name != given->name && !(is_time && options.is_one_of_two)) {
     table.refuse_columns("column '{}' is in {} by its name, in {} by `{}`; make them agree",
-                         printable(name), named->name, given->name,
-                         units.data() == time_units.data() ? "time-unit" : "pose-unit");
+                         printable(name), named->name, given->name, option);
+  }
+  const bool is_robots = begins_with(name, universal_robots) || begins_with(name, libfranka);
+  const bool in_m = is_robots && units.data() == length_units.data();
+  const bool is_assumed = !named && !given && !is_robots && units.size() > 1;
+  if (const auto other = parts_of(name, other_units).unit; is_assumed && other) {
+    table.refuse_columns("column '{}' is in {} by its name; convert it to {}, or give `{}`",
+                         printable(name), other->name, units.front().name, option);
   }
   return {.index = index,
-          .unit = named.value_or(given.value_or(units.front())),
-          .assumed = !named && !given && units.size() > 1};
+          .unit = named.value_or(given.value_or(in_m ? length_units[1] : units.front())),
+          .assumed = is_assumed};
+}
+
+std::string assumed_words(const CsvTable& table, std::span<const UnitColumn> columns) {
+  std::vector<std::string> names;
+  std::set<std::string_view> units;
+  for (const UnitColumn& column : columns) {
+    if (column.assumed) {
+      names.push_back(fmt::format("'{}'", printable(table.columns()[column.index])));
+      units.insert(column.unit.name);
+    }
+  }
+  if (names.size() == columns.size()) {
+    names = {"poses"};
+  }
+  return names.empty() ? ""
+                       : fmt::format("{} taken to be in {}", fmt::join(names, ", "),
+                                     fmt::join(units, " and "));
 }
 
 std::optional<UnitColumn> find_column(const CsvTable& table, std::string_view names,

@@ -42,6 +42,7 @@ WITH_POSES = ["--poses", "poses.csv"]
 TWO_POSES = [[10, 20, 0], [10, 20, math.pi / 2]]
 MATRIX_ROWS = ("1,0,0,10,0,1,0,20,0,0,1,5", "0,-1,0,10,1,0,0,20,0,0,1,5")
 MATRIX_COLUMNS = ("1,0,0,0,0,1,0,0,0,0,1,0,.01,.02,.005,1", "0,1,0,0,-1,0,0,0,0,0,1,0,.01,.02,.005,1")
+UR = ",".join(f"actual_TCP_pose_{i}" for i in range(6))
 LIBFRANKA = ",".join(f"O_T_EE[{i}]" for i in range(16))
 
 READ = {
@@ -59,9 +60,13 @@ READ = {
         f"10,20,5,{math.pi / 2**.5},{math.pi / 2**.5},0"), [*WITH_POSES, "--euler", "vector"], poses=TWO_POSES),
     "rotation_vector": Case(poses("x,y,z,rx,ry,rz", "10,20,5,0,0,0", f"10,20,5,0,0,{math.pi / 2}"), WITH_POSES,
         poses=TWO_POSES, said=["its poses are x, y, z and a rotation vector, columns 'x' to 'rz', in mm and rad"]),
-    "universal_robots": Case(poses(",".join(f"actual_TCP_pose_{i}" for i in range(6)), ".01,.02,.005,0,0,0",
+    "universal_robots": Case(poses(UR, ".01,.02,.005,0,0,0",
         f".01,.02,.005,0,0,{math.pi / 2}"), WITH_POSES, poses=TWO_POSES,
         said=["a rotation vector, columns 'actual_TCP_pose_0' to 'actual_TCP_pose_5', in m and rad"]),
+    "universal_robots_in_a_given_unit": Case(poses(UR, "10,20,5,0,0,0", "10,20,5,0,0,90"),
+        [*WITH_POSES, "--pose-unit", "mm,deg"], poses=TWO_POSES),
+    "universal_robots_by_number": Case(poses(UR, ".01,.02,.005,0,0,0", f".01,.02,.005,0,0,{math.pi / 2}"),
+        [*WITH_POSES, "--pose-columns", "2:7"], poses=TWO_POSES),
     "libfranka": Case(poses(LIBFRANKA, *MATRIX_COLUMNS), WITH_POSES, poses=TWO_POSES,
         said=["its poses are matrices written by columns (--matrix), columns 'O_T_EE[0]' to 'O_T_EE[15]', in m"]),
     "matrices_by_rows": Case(poses(",".join(f"t{i}" for i in range(12)), *MATRIX_ROWS),
