@@ -244,7 +244,8 @@ void add_import(CLI::App& app) {
       "actual_TCP_pose_0 to 5; O_T_EE_0 to 15]");
   command->add_option(
       "--euler", options->euler,
-      "Axes about which three angles turn, in the order of their columns: xyz, zyx and so on about "
+      "Axes about which three angles turn, in the order of their columns, or of columns called "
+      "roll, pitch and yaw, which are about x, y and z: xyz, zyx and so on about "
       "fixed axes, ZYX and so on about moving ones, as SciPy has them; or vector, a rotation "
       "vector [default: xyz, of columns called rx, ry and rz a vector]");
   command->add_option(

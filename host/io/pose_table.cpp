@@ -217,7 +217,7 @@ std::optional<SpatialPose> spatial_pose(const CsvTable& table, const PoseColumns
   }
 }
 
-/// What the columns of poses are, in a sentence; "" of x, y, theta and of quaternions.
+/// What the columns of poses in space are, in a sentence.
 std::string words_about(const CsvTable& table, const PoseColumns& columns,
                         const RotationRules& rules) {
   std::string form;
@@ -235,14 +235,16 @@ std::string words_about(const CsvTable& table, const PoseColumns& columns,
                          rules.by_columns ? "columns" : "rows");
       break;
     default:
-      return "";
+      form = "its poses are x, y, z and a quaternion x, y, z, w";
+      break;
   }
   const UnitColumn& first = columns.columns.front();
   const UnitColumn& last = columns.columns.back();
-  return fmt::format(
-      "{}, columns '{}' to '{}', in {}{}", form, printable(table.columns()[first.index]),
-      printable(table.columns()[last.index]), first.unit.name,
-      columns.form == PoseForm::matrix ? "" : fmt::format(" and {}", last.unit.name));
+  const bool one_unit = columns.form == PoseForm::matrix || columns.form == PoseForm::quaternion;
+  return fmt::format("{}, columns '{}' to '{}', in {}{}", form,
+                     printable(table.columns()[first.index]),
+                     printable(table.columns()[last.index]), first.unit.name,
+                     one_unit ? "" : fmt::format(" and {}", last.unit.name));
 }
 
 }  // namespace

@@ -161,11 +161,30 @@ PoseColumns named_pose(const CsvTable& table, const TableOptions& options) {
     // UR's names and rx, ry, rz say what they are; other angles are roll, pitch and yaw.
     const std::string_view name = table.columns()[chosen[3]];
     const bool is_vector =
-        options.euler.empty() && (alike(parts_of(name, angle_units).stem, "rx") ||
-                                  alike(name.substr(0, 15), "actual_TCP_pose"));
+        alike(parts_of(name, angle_units).stem, "rx") || begins_with(name, universal_robots);
     form = is_vector ? PoseForm::rotation_vector : form;
   }
   return pose_columns(table, form, chosen, options);
+}
+
+/// Orders the columns of a rotation as these endings of their names; false where two endings are
+/// alike or one is missing.
+bool order_by_endings(const CsvTable& table, const std::vector<std::string_view>& endings,
+                      PoseColumns& pose) {
+  const auto columns = std::span(pose.columns).last(endings.size());
+  std::vector<UnitColumn> ordered;
+  for (const std::string_view ending : endings) {
+    const auto found = std::ranges::find_if(columns, [&](const UnitColumn& column) {
+      const std::string_view stem = parts_of(table.columns()[column.index], angle_units).stem;
+      return alike(stem.substr(stem.size() - std::min(stem.size(), ending.size())), ending);
+    });
+    if (found == columns.end() || endings.front() == endings.back()) {
+      return false;
+    }
+    ordered.push_back(*found);
+  }
+  std::ranges::copy(ordered, columns.begin());
+  return true;
 }
 
 /// True for three axes of x, y and z in lower case (fixed) or in upper case (moving), none of which
@@ -321,8 +340,23 @@ PoseColumns pose_columns(const CsvTable& table, PoseForm form,
 PoseColumns find_pose(const CsvTable& table, const TableOptions& options) {
   PoseColumns pose =
       options.pose_columns.empty() ? usual_pose(table, options) : named_pose(table, options);
-  const bool is_vector = pose.form == PoseForm::euler && options.euler == "vector";
-  pose.form = is_vector ? PoseForm::rotation_vector : pose.form;
+  const bool has_angles = pose.form == PoseForm::euler || pose.form == PoseForm::rotation_vector;
+  if (has_angles && !options.euler.empty()) {
+    pose.form = options.euler == "vector" ? PoseForm::rotation_vector : PoseForm::euler;
+  }
+  if (pose.form == PoseForm::quaternion) {
+    order_by_endings(table, {"x", "y", "z", "w"}, pose);  // some write w first
+  } else if (pose.form == PoseForm::euler) {
+    // Roll is about x, pitch about y and yaw about z; others turn in the order of their columns.
+    constexpr std::string_view names[] = {"roll", "pitch", "yaw"};
+    std::vector<std::string_view> endings;
+    for (const char axis : options.euler.empty() ? std::string("xyz") : options.euler) {
+      endings.push_back(names[std::tolower(static_cast<unsigned char>(axis)) - 'x']);
+    }
+    if (!order_by_endings(table, endings, pose) && options.pose_columns.empty()) {
+      std::ranges::sort(std::span(pose.columns).last(3), {}, &UnitColumn::index);
+    }
+  }
   return pose;
 }
 

@@ -112,8 +112,12 @@ void check_numbers(const ImportOptions& options) {
           "give 1, or -1 where readings fall under load");
   require(std::isfinite(options.pose_delay_s), fmt::format("pose-delay {}", options.pose_delay_s),
           "give seconds");
-  require(options.mount.empty() || !options.poses.empty(), "mount " + options.mount,
-          "is for poses; give `poses`");
+  for (const auto& [option, value] : {std::pair<std::string, std::string>{"mount ", options.mount},
+                                      {"euler ", options.euler},
+                                      {"matrix ", options.matrix},
+                                      {"pose-columns ", options.pose_columns}}) {
+    require(value.empty() || !options.poses.empty(), option + value, "is for poses; give `poses`");
+  }
   require(!options.unposed || options.poses.empty(), "unposed",
           options.poses + " holds the poses; leave one of them out");
   if (!options.truth.empty()) {

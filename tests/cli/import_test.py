@@ -170,6 +170,7 @@ CASES = {
     "a_trajectory_without_a_header": Case(
         {"poses.csv": "0 1 2 3 0 0 0 1\n0.1 2 3 3 0 0 0.479425538604203 0.8775825618903728\n"},
         "--poses poses.csv --pose-unit m,rad", poses=[[1000, 2000, 0], [1500, 2500, 0.5], [2000, 3000, 1]],
+        warned="columns '2' to '8', in m\n",
     ),
     "tilt_under_load": Case(
         {"poses.csv": in_space(ORIGIN, tilt=0.2)}, WITH_POSES + BY_ANGLES + " --plane 0,0,2",
