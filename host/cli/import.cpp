@@ -213,7 +213,7 @@ void add_import(CLI::App& app) {
                       "columns' names, as in x_m or theta_deg, else mm,rad]");
   command->add_option(
       "--time-unit", options->time_unit,
-      "Unit of the times: s, ms, us or ns [default: by the column's name, as in time_ns, else s]");
+      "Unit of times whose column does not name it, as time_ns does: s, ms, us or ns [default: s]");
   command->add_option("--time-column", options->time_column,
                       "Name of the column of times, in both tables; a column without a name is "
                       "called by its number, from 1 [default: time, timestamp, stamp or t]");
@@ -223,7 +223,8 @@ void add_import(CLI::App& app) {
   command
       ->add_option("--where", options->where,
                    "COLUMN=VALUE: take only the rows in which the column is this, as those of one "
-                   "sensor of several; may be given more than once [default: all rows]")
+                   "sensor of several (a number is of PRESSURES); may be given more than once "
+                   "[default: all rows]")
       ->allow_extra_args(false);
   command->add_option("--split", options->split,
                       "Write a recording for each value of this column, OUTPUT-VALUE.h5, labelled "

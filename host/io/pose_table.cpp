@@ -12,6 +12,8 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 
+#include "io/recording_rules.hpp"
+#include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "palpate/touch.hpp"
 
@@ -48,6 +50,17 @@ TableColumns columns_without_names(const CsvTable& table, const TableOptions& op
           pose_columns(table, form, indices, options)};
 }
 
+/// True where the first column stands alone before the pose and counts or labels nothing.
+bool may_be_time(const CsvTable& table, const PoseColumns& pose, const TableOptions& options) {
+  constexpr std::string_view others = "frame touch row index seq n id label object";
+  const std::string& name = table.columns()[0];
+  const auto is_name = [&](std::string_view other) { return alike(other, name); };
+  return std::ranges::min(pose.columns, {}, &UnitColumn::index).index == 1 && !name.empty() &&
+         std::ranges::none_of(split_text(others, ' '), is_name) &&
+         std::ranges::none_of(conditions(options), is_name,
+                              &std::pair<std::string, std::string>::first);
+}
+
 TableColumns find_columns(const CsvTable& table, const TableOptions& options) {
   PoseColumns pose = find_pose(table, options);
   if (pose.columns.empty() && !table.has_header()) {
@@ -60,7 +73,11 @@ TableColumns find_columns(const CsvTable& table, const TableOptions& options) {
                                "X,Y,Z,ROLL,PITCH,YAW or TX,TY,TZ,QX,QY,QZ,QW"
                              : "");
   }
-  return {find_time(table, options), std::move(pose)};
+  std::optional<UnitColumn> time = find_time(table, options);
+  if (!time && options.needs_times && may_be_time(table, pose, options)) {
+    time = unit_column(table, 0, time_units, options);
+  }
+  return {time, std::move(pose)};
 }
 
 /// The columns of these names that are no part of the pose.
@@ -329,8 +346,15 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
   if (table.skipped_lines() > 0) {
     poses.understood.push_back(skipped_words(table));
   }
-  if (std::string words = words_about(table, pose, rules); !words.empty()) {
-    poses.understood.push_back(std::move(words));
+  if (options.needs_times && !find_time(table, options) &&
+      (table.has_header() || !options.pose_columns.empty())) {
+    poses.understood.push_back(
+        time ? fmt::format("its column '{}' is taken for its times, in {} (`time-column`)",
+                           printable(table.columns()[time->index]), time->unit.name)
+             : "its poses have no times (`time-column`), and are taken row by row");
+  }
+  if (!is_planar) {
+    poses.understood.push_back(words_about(table, pose, rules));
   }
   TableTimes times(table, time.value_or(UnitColumn()));
   std::uint64_t repeated = 0;

@@ -162,6 +162,7 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
         "or name it by `time-column`");
   }
   PressureTable all;
+  all.is_long = true;
   if (options.where.empty()) {
     // At least as many readings as rows; the vector grows where frames lack elements.
     all.pressure.reserve(table.count_lines());

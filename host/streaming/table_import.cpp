@@ -245,17 +245,25 @@ ImportedRecording import_tables(const ImportOptions& options) {
   TableOptions of_pressures = options;
   of_pressures.grid = grid_size(options);
   of_pressures.has_blocks = options.rows == "frames";
-  of_pressures.pose_columns = one_file ? options.pose_columns : "";
-  TableOptions of_poses = options;
-  of_poses.header_line = one_file ? options.header_line : 0;
+  of_pressures.is_one_of_two = !one_file && !options.poses.empty();
+  TableOptions of_poses = of_pressures;
+  if (!one_file) {
+    of_pressures.pose_columns = of_pressures.pose_unit = "";
+    of_poses.header_line = 0;
+    std::erase_if(of_poses.where, [](const std::string& where) {  // by number, of PRESSURES
+      return whole_number_of(where.substr(0, where.find('='))).has_value();
+    });
+  }
   ImportRows rows{.pressures =
                       read_pressures(options.pressures, array.elements_mm.size(), of_pressures)};
   const Unit length_unit = given_unit(options, length_units).value_or(length_units.front());
   std::array<Unit, 3> pose_units{length_unit, length_unit,
                                  given_unit(options, angle_units).value_or(angle_units.front())};
   if (!options.poses.empty()) {
-    // The rows of one file belong together, even where their times are equal.
-    rows.poses = read_poses(options.poses, of_poses, !one_file);
+    // The rows of one file belong together, even where their times are equal, but for those of
+    // single readings.
+    of_poses.needs_times = !one_file && !rows.pressures.time_s.empty();
+    rows.poses = read_poses(options.poses, of_poses, !one_file || rows.pressures.is_long);
     if (one_file && options.pose_delay_s != 0.0 &&
         rows.pressures.time_s.size() == rows.poses->T_robot_sensor.size()) {
       rows.poses->time_s = rows.pressures.time_s;
