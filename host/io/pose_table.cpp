@@ -307,7 +307,7 @@ std::optional<SpatialPose> pose_of_matrix(std::span<const double> numbers, bool 
     }
   }
   for (std::size_t column = 0; column < 4 && rows == 4; ++column) {
-    is_one = is_one && at(3, column) == (column == 3 ? 1.0 : 0.0);
+    is_one = is_one && std::abs(at(3, column) - (column == 3 ? 1.0 : 0.0)) <= 1e-6;
   }
   pose.rotation = glm::normalize(glm::quat_cast(r));
   return is_one ? std::optional(pose) : std::nullopt;
@@ -358,13 +358,18 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
   }
   TableTimes times(table, time.value_or(UnitColumn()));
   std::uint64_t repeated = 0;
+  std::uint64_t zeros = 0;
   while (table.next()) {
     require_flat(table, rotations);
     if (time && with_times) {
       const double time_s = times.next(poses.time_s.size());
       if (!poses.time_s.empty() && time_s == poses.time_s.back()) {
-        ++repeated;
-        continue;
+        if (is_planar ? is_finite(poses.T_robot_sensor.back()) : poses.spatial.back().has_value()) {
+          ++repeated;
+          continue;
+        }
+        poses.time_s.pop_back();
+        is_planar ? poses.T_robot_sensor.pop_back() : poses.spatial.pop_back();
       }
       poses.time_s.push_back(time_s);
     }
@@ -374,6 +379,7 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
                                              : unknown_pose);
     } else {
       poses.spatial.push_back(spatial_pose(table, pose, rules));
+      zeros += !poses.spatial.back() && table.number(pose.columns.front().index) ? 1 : 0;
     }
   }
   if (poses.T_robot_sensor.empty() && poses.spatial.empty()) {
@@ -382,6 +388,10 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
   if (repeated > 0) {
     poses.understood.push_back(fmt::format(
         "{} of its rows repeat the time of the row before, whose pose is kept", repeated));
+  }
+  if (zeros > 0) {
+    poses.understood.push_back(
+        fmt::format("{} of its poses are unknown, as their quaternion is of zeros", zeros));
   }
   poses.steps = std::move(times.steps);
   return poses;

@@ -255,7 +255,7 @@ CsvTable open_table(const std::filesystem::path& path, const TableOptions& optio
 
 std::string skipped_words(const CsvTable& table) {
   const std::uint64_t lines = table.skipped_lines();
-  return fmt::format("{} before line {} ({}) {} left out (`header-line`)",
+  return fmt::format("{} before line {} ({}) {} left out",
                      lines == 1 ? "the line" : fmt::format("{} lines", lines),
                      table.header_number(), table.header_words(), lines == 1 ? "is" : "are");
 }

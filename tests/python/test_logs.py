@@ -75,13 +75,21 @@ READ = {
         said=["its poses are matrices written by columns (--matrix), columns 'O_T_EE[0]' to 'O_T_EE[15]', in m"]),
     "matrices_by_rows": Case(poses(",".join(f"t{i}" for i in range(12)), *MATRIX_ROWS),
         [*WITH_POSES, "--pose-columns", "t{n}"], poses=TWO_POSES, said=["matrices written by rows"]),
+    "a_matrix_that_is_rounded": Case(poses(",".join(f"t{i}" for i in range(16)), MATRIX_ROWS[0] + ",1e-17,0,0,1",
+        MATRIX_ROWS[1] + ",0,1e-17,0,1"), [*WITH_POSES, "--pose-columns", "t*"], poses=TWO_POSES),
+    "a_quaternion_whose_w_is_first": Case(poses("x,y,z,qw,qx,qy,qz", "10,20,5,1,0,0,0", f"10,20,5,{DOWN},0,0,{DOWN}"),
+        [*WITH_POSES, "--pose-columns", "x:qz"], poses=TWO_POSES,
+        said=["poses.csv: its poses are x, y, z and a quaternion x, y, z, w, columns 'x' to 'qw', in mm"]),
     "quaternions_of_rostopic": Case(
         poses("field.pose.position.x,field.pose.position.y,field.pose.position.z,field.pose.orientation.x,"
         "field.pose.orientation.y,field.pose.orientation.z,field.pose.orientation.w",
         "10,20,5,0,0,0,1", f"10,20,5,0,0,{DOWN},{DOWN}"), WITH_POSES, poses=TWO_POSES),
     "a_quaternion_of_zeros_is_no_pose": Case(
         {"log.csv": PRESSURES, "poses.csv": "time,tx,ty,tz,qx,qy,qz,qw\n0,10,20,5,0,0,0,1\n.1,0,0,0,0,0,0,0\n"},
-        WITH_POSES, poses=[[10, 20, 0], [NAN] * 3]),
+        WITH_POSES, poses=[[10, 20, 0], [NAN] * 3], said=["1 of its poses are unknown, as their quaternion is"]),
+    "names_before_a_short_table": Case({"log.csv": PRESSURES,
+        "poses.csv": "Robot: A\nBy: B\nAt: C\nOn: D\ntime,x,y,theta\n0,10,20,0\n.1,10,20,0\n"}, WITH_POSES,
+        poses=[[10, 20, 0]] * 2, said=["poses.csv: 4 lines before line 5 ('time', 'x', 'y', 'theta') are left out\n"]),
     "a_mount_beside_the_flange": Case(poses("x,y,theta", "10,20,0", f"10,20,{math.pi / 2}"),
         [*WITH_POSES, "--mount", "5,0,30,0,0,90"], poses=[[15, 20, math.pi / 2], [10, 25, math.pi]]),
     "a_pad_sideways_on_a_finger": Case(poses("x,y,z,roll_deg,pitch_deg,yaw_deg", "10,20,5,0,90,0", "10,20,5,0,90,0"),
@@ -136,7 +144,7 @@ READ = {
         said=["its frames are blocks of 2 rows of 2 readings"]),
     # Times.
     "poses_at_one_time": Case(
-        {"log.csv": PRESSURES, "poses.csv": "time,x,y,theta\n0,10,20,0\n0,99,99,0\n.1,10,20,0\n"}, WITH_POSES,
+        {"log.csv": PRESSURES, "poses.csv": "time,x,y,theta\n0,,,\n0,10,20,0\n0,99,99,0\n.1,10,20,0\n"}, WITH_POSES,
         poses=[[10, 20, 0]] * 2, said=["1 of its rows repeat the time of the row before, whose pose is kept"]),
     "a_clock_of_another_name": Case({"log.csv": PRESSURES, "poses.csv": "clock,x,y,theta\n.1,10,20,0\n.2,99,99,0\n"},
         WITH_POSES, poses=[[NAN] * 3, [10, 20, 0]],
