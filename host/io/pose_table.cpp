@@ -21,7 +21,6 @@ namespace palpate {
 
 namespace {
 
-constexpr double most_turned_rad = 1e9;
 constexpr double rounding = 1e-2;  // three decimals of a log leave less
 
 std::size_t axis_of(char letter) {
@@ -86,8 +85,7 @@ std::vector<UnitColumn> columns_beside(const PoseColumns& pose, const CsvTable& 
                                        std::span<const Unit> units, const TableOptions& options) {
   std::vector<UnitColumn> beside;
   for (const char* name : names) {
-    const auto column =
-        table.has_header() ? find_column(table, name, units, options) : std::nullopt;
+    const auto column = find_column(table, name, units, options);
     if (column &&
         std::ranges::find(pose.columns, column->index, &UnitColumn::index) == pose.columns.end()) {
       beside.push_back(*column);
@@ -122,9 +120,7 @@ std::optional<std::vector<double>> numbers_in(const CsvTable& table,
       empty.push_back(fmt::format("'{}'", printable(table.columns()[column.index])));
     }
     values.push_back(column.unit.convert(number.value_or(0.0)));
-    const bool is_angle =
-        column.unit.name == angle_units[0].name || column.unit.name == angle_units[1].name;
-    if (std::abs(values.back()) > (is_angle ? most_turned_rad : farthest_mm)) {
+    if (std::abs(values.back()) > farthest_mm) {  // or as many rad
       table.refuse(
           "column '{}': {} {} is further than any robot gets; check the number and its "
           "unit",
@@ -257,11 +253,11 @@ std::string words_about(const CsvTable& table, const PoseColumns& columns,
   }
   const UnitColumn& first = columns.columns.front();
   const UnitColumn& last = columns.columns.back();
-  const bool one_unit = columns.form == PoseForm::matrix || columns.form == PoseForm::quaternion;
-  return fmt::format("{}, columns '{}' to '{}', in {}{}", form,
-                     printable(table.columns()[first.index]),
-                     printable(table.columns()[last.index]), first.unit.name,
-                     one_unit ? "" : fmt::format(" and {}", last.unit.name));
+  const bool is_matrix = columns.form == PoseForm::matrix;
+  return fmt::format(
+      "{}, columns '{}' to '{}', in {}{}", form, printable(table.columns()[first.index]),
+      printable(table.columns()[last.index]), first.unit.name,
+      is_matrix || last.unit.name.empty() ? "" : fmt::format(" and {}", last.unit.name));
 }
 
 }  // namespace

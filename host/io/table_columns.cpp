@@ -207,9 +207,7 @@ void validate(const TableOptions& options) {
              fmt::format("{}", fmt::join(values, " or ")));
     }
   };
-  if (!options.time_unit.empty() && !given_unit(options, time_units)) {
-    refuse(fmt::format("`time-unit {}`", options.time_unit), "give s, ms, us or ns");
-  }
+  require_one_of("time-unit", options.time_unit, {"s", "ms", "us", "ns"});
   require_one_of("pose-unit", options.pose_unit, {"mm,rad", "mm,deg", "m,rad", "m,deg"});
   for (const std::string& where : options.where) {
     if (const std::size_t equals = where.find('='); equals == where.npos || equals == 0) {

@@ -136,15 +136,12 @@ std::optional<SpatialPose> mount_of(const std::string& text) {
   for (std::size_t i = 0; i < numbers.size() && are_numbers; ++i) {
     const auto number = number_of(parts[i]);
     are_numbers = number.has_value() && std::abs(*number) <= farthest_mm;
-    numbers[i] = number.value_or(0.0);
+    numbers[i] = (i < 3 ? length_units[0] : angle_units[1]).convert(number.value_or(0.0));
   }
   if (!are_numbers) {
     refuse(fmt::format("`mount {}`", text),
            "give X,Y,Z,ROLL,PITCH,YAW, the array's pose in the frame whose poses are given, in mm "
            "and degrees about fixed axes");
-  }
-  for (std::size_t i = 3; i < numbers.size(); ++i) {
-    numbers[i] = angle_units[1].convert(numbers[i]);
   }
   return SpatialPose{{numbers[0], numbers[1], numbers[2]},
                      rotation_of_angles("xyz", std::span(numbers).subspan(3))};
