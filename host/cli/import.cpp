@@ -76,8 +76,8 @@ void print_summary(const ImportArguments& options, const ImportedRecording& impo
   if (imported.holds_poses && options.poses.empty()) {
     fmt::print(", its columns of poses left out (--poses {})", options.pressures);
   }
-  if (imported.assumed_units) {
-    fmt::print(", poses taken to be in mm and rad");
+  if (!imported.assumed_units.empty()) {
+    fmt::print(", {}", imported.assumed_units);
   }
   if (imported.whole_up_to) {
     fmt::print(", readings are whole numbers up to {:.0f}: raw? (--pressure-unit raw)",
@@ -213,7 +213,7 @@ void add_import(CLI::App& app) {
                       "columns' names, as in x_m or theta_deg, else mm,rad]");
   command->add_option(
       "--time-unit", options->time_unit,
-      "Unit of the times: s, ms, us or ns [default: by the column's name, as in time_ns, else s]");
+      "Unit of times whose column does not name it, as time_ns does: s, ms, us or ns [default: s]");
   command->add_option("--time-column", options->time_column,
                       "Name of the column of times, in both tables; a column without a name is "
                       "called by its number, from 1 [default: time, timestamp, stamp or t]");
@@ -223,7 +223,8 @@ void add_import(CLI::App& app) {
   command
       ->add_option("--where", options->where,
                    "COLUMN=VALUE: take only the rows in which the column is this, as those of one "
-                   "sensor of several; may be given more than once [default: all rows]")
+                   "sensor of several (a number is of PRESSURES); may be given more than once "
+                   "[default: all rows]")
       ->allow_extra_args(false);
   command->add_option("--split", options->split,
                       "Write a recording for each value of this column, OUTPUT-VALUE.h5, labelled "
@@ -244,7 +245,8 @@ void add_import(CLI::App& app) {
       "actual_TCP_pose_0 to 5; O_T_EE_0 to 15]");
   command->add_option(
       "--euler", options->euler,
-      "Axes about which three angles turn, in the order of their columns: xyz, zyx and so on about "
+      "Axes about which three angles turn, in the order of their columns, or of columns called "
+      "roll, pitch and yaw, which are about x, y and z: xyz, zyx and so on about "
       "fixed axes, ZYX and so on about moving ones, as SciPy has them; or vector, a rotation "
       "vector [default: xyz, of columns called rx, ry and rz a vector]");
   command->add_option(

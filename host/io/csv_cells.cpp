@@ -175,8 +175,11 @@ TableStart find_table(const std::vector<std::string>& lines) {
   std::size_t largest = 0;
   for (const std::string& line : lines) {
     const char separator = separator_of(line);
-    const std::size_t width = cells_in(line, separator).size();
-    const std::size_t count = width == 0 ? 0 : ++counts[{separator, width}];
+    const auto cells = cells_in(line, separator);
+    const std::size_t width = cells.size();
+    // A line "Key: value" is no row, however many there are before a short table.
+    const std::size_t weight = width > 1 && are_numbers(cells, separator) ? 10 : 1;
+    const std::size_t count = width == 0 ? 0 : counts[{separator, width}] += weight;
     // Of shapes as frequent the one that comes last, but for lines that have no separator.
     if (count > largest || (count == largest && width > 1)) {
       largest = count;

@@ -12,6 +12,8 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 
+#include "io/recording_rules.hpp"
+#include "model/number_text.hpp"
 #include "model/printable.hpp"
 #include "palpate/touch.hpp"
 
@@ -19,7 +21,6 @@ namespace palpate {
 
 namespace {
 
-constexpr double most_turned_rad = 1e9;
 constexpr double rounding = 1e-2;  // three decimals of a log leave less
 
 std::size_t axis_of(char letter) {
@@ -48,6 +49,17 @@ TableColumns columns_without_names(const CsvTable& table, const TableOptions& op
           pose_columns(table, form, indices, options)};
 }
 
+/// True where the first column stands alone before the pose and counts or labels nothing.
+bool may_be_time(const CsvTable& table, const PoseColumns& pose, const TableOptions& options) {
+  constexpr std::string_view others = "frame touch row index seq n id label object";
+  const std::string& name = table.columns()[0];
+  const auto is_name = [&](std::string_view other) { return alike(other, name); };
+  return std::ranges::min(pose.columns, {}, &UnitColumn::index).index == 1 && !name.empty() &&
+         std::ranges::none_of(split_text(others, ' '), is_name) &&
+         std::ranges::none_of(conditions(options), is_name,
+                              &std::pair<std::string, std::string>::first);
+}
+
 TableColumns find_columns(const CsvTable& table, const TableOptions& options) {
   PoseColumns pose = find_pose(table, options);
   if (pose.columns.empty() && !table.has_header()) {
@@ -60,7 +72,11 @@ TableColumns find_columns(const CsvTable& table, const TableOptions& options) {
                                "X,Y,Z,ROLL,PITCH,YAW or TX,TY,TZ,QX,QY,QZ,QW"
                              : "");
   }
-  return {find_time(table, options), std::move(pose)};
+  std::optional<UnitColumn> time = find_time(table, options);
+  if (!time && options.needs_times && may_be_time(table, pose, options)) {
+    time = unit_column(table, 0, time_units, options);
+  }
+  return {time, std::move(pose)};
 }
 
 /// The columns of these names that are no part of the pose.
@@ -69,8 +85,7 @@ std::vector<UnitColumn> columns_beside(const PoseColumns& pose, const CsvTable& 
                                        std::span<const Unit> units, const TableOptions& options) {
   std::vector<UnitColumn> beside;
   for (const char* name : names) {
-    const auto column =
-        table.has_header() ? find_column(table, name, units, options) : std::nullopt;
+    const auto column = find_column(table, name, units, options);
     if (column &&
         std::ranges::find(pose.columns, column->index, &UnitColumn::index) == pose.columns.end()) {
       beside.push_back(*column);
@@ -105,9 +120,7 @@ std::optional<std::vector<double>> numbers_in(const CsvTable& table,
       empty.push_back(fmt::format("'{}'", printable(table.columns()[column.index])));
     }
     values.push_back(column.unit.convert(number.value_or(0.0)));
-    const bool is_angle =
-        column.unit.name == angle_units[0].name || column.unit.name == angle_units[1].name;
-    if (std::abs(values.back()) > (is_angle ? most_turned_rad : farthest_mm)) {
+    if (std::abs(values.back()) > farthest_mm) {  // or as many rad
       table.refuse(
           "column '{}': {} {} is further than any robot gets; check the number and its "
           "unit",
@@ -217,7 +230,7 @@ std::optional<SpatialPose> spatial_pose(const CsvTable& table, const PoseColumns
   }
 }
 
-/// What the columns of poses are, in a sentence; "" of x, y, theta and of quaternions.
+/// What the columns of poses in space are, in a sentence.
 std::string words_about(const CsvTable& table, const PoseColumns& columns,
                         const RotationRules& rules) {
   std::string form;
@@ -235,14 +248,16 @@ std::string words_about(const CsvTable& table, const PoseColumns& columns,
                          rules.by_columns ? "columns" : "rows");
       break;
     default:
-      return "";
+      form = "its poses are x, y, z and a quaternion x, y, z, w";
+      break;
   }
   const UnitColumn& first = columns.columns.front();
   const UnitColumn& last = columns.columns.back();
+  const bool is_matrix = columns.form == PoseForm::matrix;
   return fmt::format(
       "{}, columns '{}' to '{}', in {}{}", form, printable(table.columns()[first.index]),
       printable(table.columns()[last.index]), first.unit.name,
-      columns.form == PoseForm::matrix ? "" : fmt::format(" and {}", last.unit.name));
+      is_matrix || last.unit.name.empty() ? "" : fmt::format(" and {}", last.unit.name));
 }
 
 }  // namespace
@@ -288,7 +303,7 @@ std::optional<SpatialPose> pose_of_matrix(std::span<const double> numbers, bool 
     }
   }
   for (std::size_t column = 0; column < 4 && rows == 4; ++column) {
-    is_one = is_one && at(3, column) == (column == 3 ? 1.0 : 0.0);
+    is_one = is_one && std::abs(at(3, column) - (column == 3 ? 1.0 : 0.0)) <= 1e-6;
   }
   pose.rotation = glm::normalize(glm::quat_cast(r));
   return is_one ? std::optional(pose) : std::nullopt;
@@ -300,10 +315,17 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
   const auto [time, pose] = find_columns(table, options);
   PoseTable poses;
   const bool is_planar = pose.form == PoseForm::planar;
-  for (std::size_t i = 0; i < (is_planar ? 3 : 2); ++i) {
-    poses.units[i] = pose.columns[i].unit;
-    poses.assumed_units = poses.assumed_units || pose.columns[i].assumed;
+  const bool has_angles = pose.form == PoseForm::euler || pose.form == PoseForm::rotation_vector;
+  if ((!options.euler.empty() && !has_angles) ||
+      (!options.matrix.empty() && pose.form != PoseForm::matrix)) {
+    refuse(path,
+           "its poses are of another form than `euler` or `matrix` is for; leave it out, or "
+           "name other columns by `pose-columns`");
   }
+  const Unit angle_unit = is_planar || has_angles ? pose.columns.back().unit : angle_units[0];
+  poses.units = {pose.columns[0].unit, pose.columns[1].unit,
+                 given_unit(options, angle_units).value_or(angle_unit)};
+  poses.assumed_units = assumed_words(table, pose.columns);
   // Poses of x, y and an angle leave out the height and rotations out of the plane.
   std::vector<UnitColumn> rotations;
   if (is_planar) {
@@ -320,18 +342,30 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
   if (table.skipped_lines() > 0) {
     poses.understood.push_back(skipped_words(table));
   }
-  if (std::string words = words_about(table, pose, rules); !words.empty()) {
-    poses.understood.push_back(std::move(words));
+  if (options.needs_times && !find_time(table, options) &&
+      (table.has_header() || !options.pose_columns.empty())) {
+    poses.understood.push_back(
+        time ? fmt::format("its column '{}' is taken for its times, in {} (`time-column`)",
+                           printable(table.columns()[time->index]), time->unit.name)
+             : "its poses have no times (`time-column`), and are taken row by row");
+  }
+  if (!is_planar) {
+    poses.understood.push_back(words_about(table, pose, rules));
   }
   TableTimes times(table, time.value_or(UnitColumn()));
   std::uint64_t repeated = 0;
+  std::uint64_t zeros = 0;
   while (table.next()) {
     require_flat(table, rotations);
     if (time && with_times) {
       const double time_s = times.next(poses.time_s.size());
       if (!poses.time_s.empty() && time_s == poses.time_s.back()) {
-        ++repeated;
-        continue;
+        if (is_planar ? is_finite(poses.T_robot_sensor.back()) : poses.spatial.back().has_value()) {
+          ++repeated;
+          continue;
+        }
+        poses.time_s.pop_back();
+        is_planar ? poses.T_robot_sensor.pop_back() : poses.spatial.pop_back();
       }
       poses.time_s.push_back(time_s);
     }
@@ -341,6 +375,7 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
                                              : unknown_pose);
     } else {
       poses.spatial.push_back(spatial_pose(table, pose, rules));
+      zeros += !poses.spatial.back() && table.number(pose.columns.front().index) ? 1 : 0;
     }
   }
   if (poses.T_robot_sensor.empty() && poses.spatial.empty()) {
@@ -349,6 +384,10 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
   if (repeated > 0) {
     poses.understood.push_back(fmt::format(
         "{} of its rows repeat the time of the row before, whose pose is kept", repeated));
+  }
+  if (zeros > 0) {
+    poses.understood.push_back(
+        fmt::format("{} of its poses are unknown, as their quaternion is of zeros", zeros));
   }
   poses.steps = std::move(times.steps);
   return poses;

@@ -48,7 +48,7 @@ struct PoseTable {
   std::vector<std::optional<SpatialPose>> spatial;
   std::vector<double> height_mm;  ///< [n] above the plane of the touches, of poses in space
   std::array<Unit, 3> units{length_units[0], length_units[0], angle_units[0]};  ///< of x, y, theta
-  bool assumed_units = false;                ///< neither names nor options give them: mm and rad
+  std::string assumed_units = {};            ///< see assumed_words()
   std::vector<ClockStep> steps = {};         ///< where the clock steps back
   std::vector<std::string> understood = {};  ///< what was not plain, in sentences
 };

@@ -162,6 +162,7 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
         "or name it by `time-column`");
   }
   PressureTable all;
+  all.is_long = true;
   if (options.where.empty()) {
     // At least as many readings as rows; the vector grows where frames lack elements.
     all.pressure.reserve(table.count_lines());
@@ -229,7 +230,8 @@ PressureTable read_pressures(const std::filesystem::path& path, std::size_t elem
   pressures = pressures ? std::move(pressures) : read_long(table, elements, options);
   pressures = pressures ? std::move(pressures) : read_wide(table, elements, options);
   if (table.skipped_lines() > 0) {
-    pressures->understood.insert(pressures->understood.begin(), skipped_words(table));
+    pressures->understood.insert(pressures->understood.begin(),
+                                 skipped_words(table) + " (`header-line`)");
   }
   if (pressures->pressure.empty()) {
     refuse(path, "holds a header and no row; write a row for each frame");

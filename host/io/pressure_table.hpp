@@ -15,6 +15,7 @@ struct PressureTable {
   std::vector<double> time_s;              ///< [n], or empty
   std::vector<double> device_time_s;       ///< [n], or empty
   std::vector<std::uint64_t> lost_before;  ///< [n], or empty
+  bool is_long = false;                    ///< its rows are single readings
   bool holds_poses = false;           ///< a wide table has columns of poses beside the readings
   std::vector<ClockStep> steps = {};  ///< where the clock steps back
   std::vector<std::string> understood = {};  ///< what was not plain, in sentences

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <iterator>
+#include <set>
 
 #include <fmt/ranges.h>
 
@@ -12,9 +13,6 @@
 namespace palpate {
 
 namespace {
-
-constexpr Unit metres[] = {{"m", 1e3, 1.0}};
-constexpr Unit radians[] = {{"rad"}};
 
 /// A quantity that columns hold, with its usual names, separated by blanks, and its units.
 struct Quantity {
@@ -54,6 +52,9 @@ std::vector<Quantity> quantities_of(PoseForm form) {
   return std::vector<Quantity>(16, position[0]);
 }
 
+/// Units that tables may have, and that are not read.
+constexpr Unit other_units[] = {{"cm"}, {"um"}, {"in"}, {"inch"}, {"min"}, {"h"}, {"mrad"}};
+
 /// Names of units that stand for the units above.
 constexpr std::pair<std::string_view, std::string_view> spellings[] = {
     {"sec", "s"},   {"seconds", "s"},   {"msec", "ms"},     {"µs", "us"},
@@ -89,11 +90,19 @@ NameParts parts_of(std::string_view name, std::span<const Unit> units) {
   return unit ? NameParts{name.substr(0, line), unit} : NameParts{name, {}};
 }
 
-/// The columns whose names are `stem` and so many numbers from 0 on, as robots name the parts of a
-/// pose: in metres and radians.
-std::vector<UnitColumn> counted_columns(const CsvTable& table, std::string_view stem,
-                                        std::size_t count) {
-  std::vector<UnitColumn> columns;
+// Universal Robots' RTDE and libfranka name the parts of a pose by a stem and numbers from 0 on,
+// and log them in metres and radians.
+constexpr std::string_view universal_robots = "actual_TCP_pose";
+constexpr std::string_view libfranka = "O_T_EE";
+
+bool begins_with(std::string_view name, std::string_view stem) {
+  return alike(name.substr(0, stem.size()), stem);
+}
+
+/// The columns whose names are `stem` and so many numbers from 0 on.
+std::vector<std::size_t> counted_columns(const CsvTable& table, std::string_view stem,
+                                         std::size_t count) {
+  std::vector<std::size_t> columns;
   for (std::size_t i = 0; i < count; ++i) {
     std::optional<std::size_t> found;
     for (const char* form : {"{}_{}", "{}[{}]", "{}{}", "{}.{}"}) {
@@ -102,39 +111,30 @@ std::vector<UnitColumn> counted_columns(const CsvTable& table, std::string_view 
     if (!found) {
       return {};
     }
-    columns.push_back({.index = *found, .unit = i < 3 ? metres[0] : radians[0]});
+    columns.push_back(*found);
   }
   return columns;
 }
 
-/// The columns that have the usual names of a pose of this form; none unless the table has all.
-std::vector<UnitColumn> usual_columns(const CsvTable& table, PoseForm form,
-                                      const TableOptions& options) {
-  std::vector<UnitColumn> columns;
-  for (const Quantity& quantity : quantities_of(form)) {
-    const auto column = find_column(table, quantity.names, quantity.units, options);
-    if (!column) {
-      return {};
-    }
-    columns.push_back(*column);
-  }
-  return columns;
-}
-
+/// The columns that have the usual names of one form; none unless the table has all.
 PoseColumns usual_pose(const CsvTable& table, const TableOptions& options) {
   for (const PoseForm form :
        {PoseForm::euler, PoseForm::planar, PoseForm::quaternion, PoseForm::rotation_vector}) {
-    if (auto columns = usual_columns(table, form, options); !columns.empty()) {
-      return {form, std::move(columns)};
+    const std::vector<Quantity> quantities = quantities_of(form);
+    PoseColumns pose{form, {}};
+    for (const Quantity& quantity : quantities) {
+      if (const auto column = find_column(table, quantity.names, quantity.units, options)) {
+        pose.columns.push_back(*column);
+      }
+    }
+    if (pose.columns.size() == quantities.size()) {
+      return pose;
     }
   }
-  // Universal Robots' RTDE, and libfranka.
-  if (auto columns = counted_columns(table, "actual_TCP_pose", 6); !columns.empty()) {
-    return {PoseForm::rotation_vector, std::move(columns)};
+  if (const auto columns = counted_columns(table, universal_robots, 6); !columns.empty()) {
+    return pose_columns(table, PoseForm::rotation_vector, columns, options);
   }
-  PoseColumns pose{PoseForm::matrix, counted_columns(table, "O_T_EE", 16)};
-  std::ranges::for_each(pose.columns, [](UnitColumn& column) { column.unit = metres[0]; });
-  return pose;
+  return pose_columns(table, PoseForm::matrix, counted_columns(table, libfranka, 16), options);
 }
 
 PoseColumns named_pose(const CsvTable& table, const TableOptions& options) {
@@ -161,11 +161,30 @@ PoseColumns named_pose(const CsvTable& table, const TableOptions& options) {
     // UR's names and rx, ry, rz say what they are; other angles are roll, pitch and yaw.
     const std::string_view name = table.columns()[chosen[3]];
     const bool is_vector =
-        options.euler.empty() && (alike(parts_of(name, angle_units).stem, "rx") ||
-                                  alike(name.substr(0, 15), "actual_TCP_pose"));
+        alike(parts_of(name, angle_units).stem, "rx") || begins_with(name, universal_robots);
     form = is_vector ? PoseForm::rotation_vector : form;
   }
   return pose_columns(table, form, chosen, options);
+}
+
+/// Orders the columns of a rotation as these endings of their names; false where two endings are
+/// alike or one is missing.
+bool order_by_endings(const CsvTable& table, const std::vector<std::string_view>& endings,
+                      PoseColumns& pose) {
+  const auto columns = std::span(pose.columns).last(endings.size());
+  std::vector<UnitColumn> ordered;
+  for (const std::string_view ending : endings) {
+    const auto found = std::ranges::find_if(columns, [&](const UnitColumn& column) {
+      const std::string_view stem = parts_of(table.columns()[column.index], angle_units).stem;
+      return alike(stem.substr(stem.size() - std::min(stem.size(), ending.size())), ending);
+    });
+    if (found == columns.end() || endings.front() == endings.back()) {
+      return false;
+    }
+    ordered.push_back(*found);
+  }
+  std::ranges::copy(ordered, columns.begin());
+  return true;
 }
 
 /// True for three axes of x, y and z in lower case (fixed) or in upper case (moving), none of which
@@ -188,9 +207,7 @@ void validate(const TableOptions& options) {
              fmt::format("{}", fmt::join(values, " or ")));
     }
   };
-  if (!options.time_unit.empty() && !given_unit(options, time_units)) {
-    refuse(fmt::format("`time-unit {}`", options.time_unit), "give s, ms, us or ns");
-  }
+  require_one_of("time-unit", options.time_unit, {"s", "ms", "us", "ns"});
   require_one_of("pose-unit", options.pose_unit, {"mm,rad", "mm,deg", "m,rad", "m,deg"});
   for (const std::string& where : options.where) {
     if (const std::size_t equals = where.find('='); equals == where.npos || equals == 0) {
@@ -236,7 +253,7 @@ CsvTable open_table(const std::filesystem::path& path, const TableOptions& optio
 
 std::string skipped_words(const CsvTable& table) {
   const std::uint64_t lines = table.skipped_lines();
-  return fmt::format("{} before line {} ({}) {} left out (`header-line`)",
+  return fmt::format("{} before line {} ({}) {} left out",
                      lines == 1 ? "the line" : fmt::format("{} lines", lines),
                      table.header_number(), table.header_words(), lines == 1 ? "is" : "are");
 }
@@ -246,14 +263,40 @@ UnitColumn unit_column(const CsvTable& table, std::size_t index, std::span<const
   const std::string& name = table.columns()[index];
   const std::optional<Unit> named = parts_of(name, units).unit;
   const std::optional<Unit> given = given_unit(options, units);
-  if (named && given && named->name != given->name) {
+  const bool is_time = units.data() == time_units.data();
+  const char* const option = is_time ? "time-unit" : "pose-unit";
+  // With two tables, the unit of times may be meant for the other one.
+  if (named && given && named->name != given->name && !(is_time && options.is_one_of_two)) {
     table.refuse_columns("column '{}' is in {} by its name, in {} by `{}`; make them agree",
-                         printable(name), named->name, given->name,
-                         units.data() == time_units.data() ? "time-unit" : "pose-unit");
+                         printable(name), named->name, given->name, option);
+  }
+  const bool is_robots = begins_with(name, universal_robots) || begins_with(name, libfranka);
+  const bool in_m = is_robots && units.data() == length_units.data();
+  const bool is_assumed = !named && !given && !is_robots && units.size() > 1;
+  if (const auto other = parts_of(name, other_units).unit; is_assumed && other) {
+    table.refuse_columns("column '{}' is in {} by its name; convert it to {}, or give `{}`",
+                         printable(name), other->name, units.front().name, option);
   }
   return {.index = index,
-          .unit = named.value_or(given.value_or(units.front())),
-          .assumed = !named && !given && units.size() > 1};
+          .unit = named.value_or(given.value_or(in_m ? length_units[1] : units.front())),
+          .assumed = is_assumed};
+}
+
+std::string assumed_words(const CsvTable& table, std::span<const UnitColumn> columns) {
+  std::vector<std::string> names;
+  std::set<std::string_view> units;
+  for (const UnitColumn& column : columns) {
+    if (column.assumed) {
+      names.push_back(fmt::format("'{}'", printable(table.columns()[column.index])));
+      units.insert(column.unit.name);
+    }
+  }
+  if (names.size() == columns.size()) {
+    names = {"poses"};
+  }
+  return names.empty() ? ""
+                       : fmt::format("{} taken to be in {}", fmt::join(names, ", "),
+                                     fmt::join(units, " and "));
 }
 
 std::optional<UnitColumn> find_column(const CsvTable& table, std::string_view names,
@@ -295,8 +338,23 @@ PoseColumns pose_columns(const CsvTable& table, PoseForm form,
 PoseColumns find_pose(const CsvTable& table, const TableOptions& options) {
   PoseColumns pose =
       options.pose_columns.empty() ? usual_pose(table, options) : named_pose(table, options);
-  const bool is_vector = pose.form == PoseForm::euler && options.euler == "vector";
-  pose.form = is_vector ? PoseForm::rotation_vector : pose.form;
+  const bool has_angles = pose.form == PoseForm::euler || pose.form == PoseForm::rotation_vector;
+  if (has_angles && !options.euler.empty()) {
+    pose.form = options.euler == "vector" ? PoseForm::rotation_vector : PoseForm::euler;
+  }
+  if (pose.form == PoseForm::quaternion) {
+    order_by_endings(table, {"x", "y", "z", "w"}, pose);  // some write w first
+  } else if (pose.form == PoseForm::euler) {
+    // Roll is about x, pitch about y and yaw about z; others turn in the order of their columns.
+    constexpr std::string_view names[] = {"roll", "pitch", "yaw"};
+    std::vector<std::string_view> endings;
+    for (const char axis : options.euler.empty() ? std::string("xyz") : options.euler) {
+      endings.push_back(names[std::tolower(static_cast<unsigned char>(axis)) - 'x']);
+    }
+    if (!order_by_endings(table, endings, pose) && options.pose_columns.empty()) {
+      std::ranges::sort(std::span(pose.columns).last(3), {}, &UnitColumn::index);
+    }
+  }
   return pose;
 }
 

@@ -50,6 +50,10 @@ struct TableOptions {
   std::string matrix;     ///< how a matrix is written: "columns" or "rows"; "": found
   std::string time_unit;  ///< "s", "ms", "us" or "ns"; "": by the column's name, else s
   std::string pose_unit;  ///< such as "m,deg"; "": by the columns' names, else mm and rad
+  /// Set by import_tables(): the table is that of the poses or of the pressures.
+  bool is_one_of_two = false;
+  /// Set by import_tables(): of poses in their own table, beside frames that have times.
+  bool needs_times = false;
   /// Set by import_tables(): columns and rows of the array.
   std::optional<std::array<std::size_t, 2>> grid = {};
   /// Set by import_tables(): each frame may be a block of rows, as the array has them.
@@ -84,6 +88,10 @@ struct UnitColumn {
 /// @throws Error where the column's name and the options differ
 UnitColumn unit_column(const CsvTable& table, std::size_t index, std::span<const Unit> units,
                        const TableOptions& options);
+
+/// Which columns of a pose are taken to be in which units, "poses taken to be in mm and rad"; ""
+/// where names or options give them all.
+std::string assumed_words(const CsvTable& table, std::span<const UnitColumn> columns);
 
 /// Finds the column of one of these names, which are separated by blanks. A name may end with its
 /// unit, such as time_ms, time [ms] or time (ms). None where there is no such column.

@@ -108,11 +108,9 @@ std::vector<Pose> read_candidates(const std::filesystem::path& path,
   if (!table.spatial.empty()) {
     refuse(path, "has poses in space; give x, y and theta in the plane of the touches");
   }
-  if (table.assumed_units) {
-    tell(
-        fmt::format("{}: poses taken to be in mm and rad; name the columns x_mm, y_mm, theta_deg "
-                    "for others",
-                    path.string()));
+  if (!table.assumed_units.empty()) {
+    tell(fmt::format("{}: {}; name the columns x_mm, y_mm, theta_deg for others", path.string(),
+                     table.assumed_units));
   }
   return table.T_robot_sensor;
 }

@@ -158,7 +158,7 @@ void join(PoseTable poses, const ImportSurvey& survey, const ImportOptions& opti
     refuse(
         options.poses,
         "holds {} poses without a time for {} frames or touches of {}; write a table with one for "
-        "each, or give both a column 'time'",
+        "each, or give both a column 'time', or name it by `time-column`",
         poses.T_robot_sensor.size(), n, options.pressures);
   }
   find_clock(poses, survey, options, imported);

@@ -112,8 +112,12 @@ void check_numbers(const ImportOptions& options) {
           "give 1, or -1 where readings fall under load");
   require(std::isfinite(options.pose_delay_s), fmt::format("pose-delay {}", options.pose_delay_s),
           "give seconds");
-  require(options.mount.empty() || !options.poses.empty(), "mount " + options.mount,
-          "is for poses; give `poses`");
+  for (const auto& [option, value] : {std::pair<std::string, std::string>{"mount ", options.mount},
+                                      {"euler ", options.euler},
+                                      {"matrix ", options.matrix},
+                                      {"pose-columns ", options.pose_columns}}) {
+    require(value.empty() || !options.poses.empty(), option + value, "is for poses; give `poses`");
+  }
   require(!options.unposed || options.poses.empty(), "unposed",
           options.poses + " holds the poses; leave one of them out");
   if (!options.truth.empty()) {
@@ -132,15 +136,12 @@ std::optional<SpatialPose> mount_of(const std::string& text) {
   for (std::size_t i = 0; i < numbers.size() && are_numbers; ++i) {
     const auto number = number_of(parts[i]);
     are_numbers = number.has_value() && std::abs(*number) <= farthest_mm;
-    numbers[i] = number.value_or(0.0);
+    numbers[i] = (i < 3 ? length_units[0] : angle_units[1]).convert(number.value_or(0.0));
   }
   if (!are_numbers) {
     refuse(fmt::format("`mount {}`", text),
            "give X,Y,Z,ROLL,PITCH,YAW, the array's pose in the frame whose poses are given, in mm "
            "and degrees about fixed axes");
-  }
-  for (std::size_t i = 3; i < numbers.size(); ++i) {
-    numbers[i] = angle_units[1].convert(numbers[i]);
   }
   return SpatialPose{{numbers[0], numbers[1], numbers[2]},
                      rotation_of_angles("xyz", std::span(numbers).subspan(3))};
@@ -241,17 +242,25 @@ ImportedRecording import_tables(const ImportOptions& options) {
   TableOptions of_pressures = options;
   of_pressures.grid = grid_size(options);
   of_pressures.has_blocks = options.rows == "frames";
-  of_pressures.pose_columns = one_file ? options.pose_columns : "";
-  TableOptions of_poses = options;
-  of_poses.header_line = one_file ? options.header_line : 0;
+  of_pressures.is_one_of_two = !one_file && !options.poses.empty();
+  TableOptions of_poses = of_pressures;
+  if (!one_file) {
+    of_pressures.pose_columns = of_pressures.pose_unit = "";
+    of_poses.header_line = 0;
+    std::erase_if(of_poses.where, [](const std::string& where) {  // by number, of PRESSURES
+      return whole_number_of(where.substr(0, where.find('='))).has_value();
+    });
+  }
   ImportRows rows{.pressures =
                       read_pressures(options.pressures, array.elements_mm.size(), of_pressures)};
   const Unit length_unit = given_unit(options, length_units).value_or(length_units.front());
   std::array<Unit, 3> pose_units{length_unit, length_unit,
                                  given_unit(options, angle_units).value_or(angle_units.front())};
   if (!options.poses.empty()) {
-    // The rows of one file belong together, even where their times are equal.
-    rows.poses = read_poses(options.poses, of_poses, !one_file);
+    // The rows of one file belong together, even where their times are equal, but for those of
+    // single readings.
+    of_poses.needs_times = !one_file && !rows.pressures.time_s.empty();
+    rows.poses = read_poses(options.poses, of_poses, !one_file || rows.pressures.is_long);
     if (one_file && options.pose_delay_s != 0.0 &&
         rows.pressures.time_s.size() == rows.poses->T_robot_sensor.size()) {
       rows.poses->time_s = rows.pressures.time_s;

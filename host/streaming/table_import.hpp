@@ -45,10 +45,10 @@ struct ImportOptions : TableOptions {
 /// The recording that the tables make.
 struct ImportedRecording {
   Recording recording;
-  bool assumed_units = false;  ///< nothing said that the poses are in mm and rad
-  bool holds_poses = false;    ///< the table of pressures has columns of poses
-  double largest_gap_s = 0.0;  ///< poses further apart in time were not interpolated
-  std::size_t in_gaps = 0;     ///< frames between two poses that are further apart
+  std::string assumed_units = {};  ///< as of PoseTable
+  bool holds_poses = false;        ///< the table of pressures has columns of poses
+  double largest_gap_s = 0.0;      ///< poses further apart in time were not interpolated
+  std::size_t in_gaps = 0;         ///< frames between two poses that are further apart
   /// The largest reading where all are whole numbers, as raw ones are, but said to be in kPa.
   std::optional<double> whole_up_to = {};
   /// What was understood, or is worth saying, in sentences that begin with their file.

@@ -40,9 +40,8 @@ std::vector<std::string> remarks_on(const ImportedRecording& imported,
     remarks.push_back(fmt::format("{}: its columns of poses were left out; give it as poses, too",
                                   options.pressures));
   }
-  if (imported.assumed_units) {
-    remarks.push_back(
-        fmt::format("{}: poses taken to be in mm and rad; give pose_unit", options.poses));
+  if (!imported.assumed_units.empty()) {
+    remarks.push_back(fmt::format("{}: {}; give pose_unit", options.poses, imported.assumed_units));
   }
   for (const std::string& words : imported.understood) {
     remarks.push_back(in_keywords(words));

@@ -72,7 +72,7 @@ CASES = {
     ),
     "frames_after_the_last_pose_lie_in_no_gap": Case(
         {"poses.csv": "time,x,y,theta_rad\n0,0,5,-1\n0.05,10,7,1\n"}, WITH_POSES,
-        said="2 with a pose, poses taken to be in mm and rad; next",
+        said="2 with a pose, 'x', 'y' taken to be in mm; next",
     ),
     "touches_at_unknown_poses": Case(
         {}, "--rows touches --unposed --object A", poses=ORIGIN, said="; next: palpate map o.h5 -o MAPS/ --unposed\n",
@@ -170,6 +170,7 @@ CASES = {
     "a_trajectory_without_a_header": Case(
         {"poses.csv": "0 1 2 3 0 0 0 1\n0.1 2 3 3 0 0 0.479425538604203 0.8775825618903728\n"},
         "--poses poses.csv --pose-unit m,rad", poses=[[1000, 2000, 0], [1500, 2500, 0.5], [2000, 3000, 1]],
+        warned="columns '2' to '8', in m\n",
     ),
     "tilt_under_load": Case(
         {"poses.csv": in_space(ORIGIN, tilt=0.2)}, WITH_POSES + BY_ANGLES + " --plane 0,0,2",
@@ -240,11 +241,12 @@ class Import(ImportTest):
                     self.assert_close(self.table("array.csv")[1], case.array)
 
     def test_says_what_a_recording_is_of(self) -> None:
-        self.put({"poses.csv": "time,x_m,y_mm,theta_deg\n0,0,0,0\n0.1,0,0,0\n"})
-        said = self.said("--poses poses.csv --truth A,0.5,2,90 --pressure-unit raw --object A")
-        self.assert_named(said, "--onset P")
-        back = self.done("export", "o.h5", "-o", "t")
-        self.assert_named(back, "--pressure-unit raw", "--object=A", f"--truth=A,500,2,{math.pi / 2}")
+        for names, row in (("theta_deg", "0,0,0"), ("z,roll_deg,pitch_deg,yaw_deg", "0,0,0,0,0,0")):
+            self.put({"poses.csv": f"time,x_m,y_mm,{names}\n0,{row}\n0.1,{row}\n"})
+            flags = "--poses poses.csv --truth A,0.5,2,90 --pressure-unit raw --object A"
+            self.assert_named(self.palpate(*self.arguments(flags)).stdout, "--onset P")
+            back = self.done("export", "o.h5", "-o", "t")
+            self.assert_named(back, "--pressure-unit raw", "--object=A", f"--truth=A,500,2,{math.pi / 2}")
         self.said()
         self.assertNotIn(b"sensor_pose", (self.folder / "o.h5").read_bytes())
         self.assert_named(self.done("info", "o.h5"), "frames            3", "with a pose       0 frames")

@@ -42,6 +42,7 @@ WITH_POSES = ["--poses", "poses.csv"]
 TWO_POSES = [[10, 20, 0], [10, 20, math.pi / 2]]
 MATRIX_ROWS = ("1,0,0,10,0,1,0,20,0,0,1,5", "0,-1,0,10,1,0,0,20,0,0,1,5")
 MATRIX_COLUMNS = ("1,0,0,0,0,1,0,0,0,0,1,0,.01,.02,.005,1", "0,1,0,0,-1,0,0,0,0,0,1,0,.01,.02,.005,1")
+UR = ",".join(f"actual_TCP_pose_{i}" for i in range(6))
 LIBFRANKA = ",".join(f"O_T_EE[{i}]" for i in range(16))
 
 READ = {
@@ -55,24 +56,40 @@ READ = {
     "other_axes": Case(poses("a,b,c,rz,ry,rx", "10,20,5,0,0,180", "10,20,5,90,0,180"),
         [*WITH_POSES, "--pose-columns", "a:rx", "--euler", "ZYX", "--pose-unit", "mm,deg"], poses=TWO_POSES,
         said=["angles about the moving axes ZYX"]),
+    "angles_of_names_turn_about_their_axes": Case(poses("x,y,z,yaw,pitch,roll", "10,20,5,0,0,0",
+        f"10,20,5,{math.pi / 2},0,0"), [*WITH_POSES, "--euler", "ZYX"], poses=TWO_POSES),
+    "angles_called_as_a_vector": Case(poses("x,y,z,rx,ry,rz", "10,20,5,180,0,0", "10,20,5,180,0,90"),
+        [*WITH_POSES, "--euler", "xyz", "--pose-unit", "mm,deg"], poses=TWO_POSES),
     "a_vector_whose_columns_are_named_otherwise": Case(poses("x,y,z,roll,pitch,yaw", f"10,20,5,{math.pi},0,0",
         f"10,20,5,{math.pi / 2**.5},{math.pi / 2**.5},0"), [*WITH_POSES, "--euler", "vector"], poses=TWO_POSES),
     "rotation_vector": Case(poses("x,y,z,rx,ry,rz", "10,20,5,0,0,0", f"10,20,5,0,0,{math.pi / 2}"), WITH_POSES,
         poses=TWO_POSES, said=["its poses are x, y, z and a rotation vector, columns 'x' to 'rz', in mm and rad"]),
-    "universal_robots": Case(poses(",".join(f"actual_TCP_pose_{i}" for i in range(6)), ".01,.02,.005,0,0,0",
+    "universal_robots": Case(poses(UR, ".01,.02,.005,0,0,0",
         f".01,.02,.005,0,0,{math.pi / 2}"), WITH_POSES, poses=TWO_POSES,
         said=["a rotation vector, columns 'actual_TCP_pose_0' to 'actual_TCP_pose_5', in m and rad"]),
+    "universal_robots_in_a_given_unit": Case(poses(UR, "10,20,5,0,0,0", "10,20,5,0,0,90"),
+        [*WITH_POSES, "--pose-unit", "mm,deg"], poses=TWO_POSES),
+    "universal_robots_by_number": Case(poses(UR, ".01,.02,.005,0,0,0", f".01,.02,.005,0,0,{math.pi / 2}"),
+        [*WITH_POSES, "--pose-columns", "2:7"], poses=TWO_POSES),
     "libfranka": Case(poses(LIBFRANKA, *MATRIX_COLUMNS), WITH_POSES, poses=TWO_POSES,
         said=["its poses are matrices written by columns (--matrix), columns 'O_T_EE[0]' to 'O_T_EE[15]', in m"]),
     "matrices_by_rows": Case(poses(",".join(f"t{i}" for i in range(12)), *MATRIX_ROWS),
         [*WITH_POSES, "--pose-columns", "t{n}"], poses=TWO_POSES, said=["matrices written by rows"]),
+    "a_matrix_that_is_rounded": Case(poses(",".join(f"t{i}" for i in range(16)), MATRIX_ROWS[0] + ",1e-17,0,0,1",
+        MATRIX_ROWS[1] + ",0,1e-17,0,1"), [*WITH_POSES, "--pose-columns", "t*"], poses=TWO_POSES),
+    "a_quaternion_whose_w_is_first": Case(poses("x,y,z,qw,qx,qy,qz", "10,20,5,1,0,0,0", f"10,20,5,{DOWN},0,0,{DOWN}"),
+        [*WITH_POSES, "--pose-columns", "x:qz"], poses=TWO_POSES,
+        said=["poses.csv: its poses are x, y, z and a quaternion x, y, z, w, columns 'x' to 'qw', in mm"]),
     "quaternions_of_rostopic": Case(
         poses("field.pose.position.x,field.pose.position.y,field.pose.position.z,field.pose.orientation.x,"
         "field.pose.orientation.y,field.pose.orientation.z,field.pose.orientation.w",
         "10,20,5,0,0,0,1", f"10,20,5,0,0,{DOWN},{DOWN}"), WITH_POSES, poses=TWO_POSES),
     "a_quaternion_of_zeros_is_no_pose": Case(
         {"log.csv": PRESSURES, "poses.csv": "time,tx,ty,tz,qx,qy,qz,qw\n0,10,20,5,0,0,0,1\n.1,0,0,0,0,0,0,0\n"},
-        WITH_POSES, poses=[[10, 20, 0], [NAN] * 3]),
+        WITH_POSES, poses=[[10, 20, 0], [NAN] * 3], said=["1 of its poses are unknown, as their quaternion is"]),
+    "names_before_a_short_table": Case({"log.csv": PRESSURES,
+        "poses.csv": "Robot: A\nBy: B\nAt: C\nOn: D\ntime,x,y,theta\n0,10,20,0\n.1,10,20,0\n"}, WITH_POSES,
+        poses=[[10, 20, 0]] * 2, said=["poses.csv: 4 lines before line 5 ('time', 'x', 'y', 'theta') are left out\n"]),
     "a_mount_beside_the_flange": Case(poses("x,y,theta", "10,20,0", f"10,20,{math.pi / 2}"),
         [*WITH_POSES, "--mount", "5,0,30,0,0,90"], poses=[[15, 20, math.pi / 2], [10, 25, math.pi]]),
     "a_pad_sideways_on_a_finger": Case(poses("x,y,z,roll_deg,pitch_deg,yaw_deg", "10,20,5,0,90,0", "10,20,5,0,90,0"),
@@ -100,6 +117,12 @@ READ = {
     "rows_of_which_two_columns_hold": Case(
         "time,id,side,p0,p1\n0,2,left,1,2\n0,2,right,9,9\n.1,1,left,9,9\n.1,2.0,left,3,4\n",
         ["--where", "id=2", "--where", "side=left"], READINGS, times=[0, 0.1]),
+    "rows_of_the_pressures_by_number": Case({"log.csv": "time,id,p0,p1\n0,2,1,2\n0,1,9,9\n.1,2,3,4\n",
+        "poses.csv": "time,x,y,theta\n0,10,20,0\n.1,2,20,0\n"}, [*WITH_POSES, "--where", "2=2"], READINGS,
+        poses=[[10, 20, 0], [2, 20, 0]]),
+    "poses_beside_single_readings": Case(
+        "time,element,pressure,x,y,theta\n0,0,1,10,20,0\n0,1,2,10,20,0\n.1,0,3,2,20,0\n.1,1,4,2,20,0\n",
+        ["--poses", "log.csv"], READINGS, poses=[[10, 20, 0], [2, 20, 0]]),
     # Sheets.
     "lines_before_the_header": Case("Tactile array 5\nRecorded 2026-11-01, by hand\n\ntime,p0,p1\n0,1,2\n.1,3,4\n",
         [], READINGS, said=["log.csv: 2 lines before line 4 ('time', 'p0', 'p1') are left out (--header-line)"]),
@@ -121,8 +144,16 @@ READ = {
         said=["its frames are blocks of 2 rows of 2 readings"]),
     # Times.
     "poses_at_one_time": Case(
-        {"log.csv": PRESSURES, "poses.csv": "time,x,y,theta\n0,10,20,0\n0,99,99,0\n.1,10,20,0\n"}, WITH_POSES,
+        {"log.csv": PRESSURES, "poses.csv": "time,x,y,theta\n0,,,\n0,10,20,0\n0,99,99,0\n.1,10,20,0\n"}, WITH_POSES,
         poses=[[10, 20, 0]] * 2, said=["1 of its rows repeat the time of the row before, whose pose is kept"]),
+    "a_clock_of_another_name": Case({"log.csv": PRESSURES, "poses.csv": "clock,x,y,theta\n.1,10,20,0\n.2,99,99,0\n"},
+        WITH_POSES, poses=[[NAN] * 3, [10, 20, 0]],
+        said=["poses.csv: its column 'clock' is taken for its times, in s (--time-column)"]),
+    "poses_that_are_counted": Case({"log.csv": PRESSURES, "poses.csv": "frame,x,y,theta\n0,10,20,0\n1,10,20,0\n"},
+        WITH_POSES, poses=[[10, 20, 0]] * 2, said=["its poses have no times (--time-column), and are taken"]),
+    "a_unit_of_the_other_times": Case({"log.csv": "time,p0,p1\n0,1,2\n100,3,4\n",
+        "poses.csv": "time_s,x,y,theta\n0,10,20,0\n.1,10,20,0\n"}, [*WITH_POSES, "--time-unit", "ms"], READINGS,
+        times=[0, 0.1], poses=[[10, 20, 0]] * 2),
     "a_clock_that_steps_back": Case({"log.csv": "time,p0,p1\n5,1,2\n6,3,4\n0.5,1,2\n1.5,3,4\n",
         "poses.csv": "time,x,y,theta\n5,1,1,0\n6,1,1,0\n0,2,2,0\n2,2,2,0\n"}, [*WITH_POSES, "--largest-gap-s", "3"],
         READINGS * 2, times=[5, 6, 16.5, 17.5], poses=[[1, 1, 0]] * 2 + [[2, 2, 0]] * 2,
@@ -188,8 +219,15 @@ REFUSED: dict[str, tuple["Files | str | bytes", list[str], str]] = {
         "--plane: missing"),
     "a_plane_of_plane_poses": ({}, [*WITH_POSES, "--plane", "0,0,1"], "--plane 0,0,1: is for poses in space"),
     "an_array_of_one_column": ({"a.txt": "1\n2\n"}, ["--array", "a.txt"], "a.txt:1: no column is called 'x'"),
-    "a_long_table_with_poses": ("time,element,pressure,x,y,theta\n0,0,1,0,0,0\n0,1,1,0,0,0\n", ["--poses", "log.csv"],
-        "log.csv: holds 2 poses without a time for 1 frames or touches of log.csv"),
+    "a_long_table_of_poses_without_times": ("frame,element,pressure,x,y,theta\n0,0,1,0,0,0\n0,1,1,0,0,0\n",
+        ["--poses", "log.csv"], "log.csv: holds 2 poses without a time for 1 frames or touches of log.csv"),
+    "a_unit_that_is_not_read": ("elapsed [min],p0,p1\n0,1,2\n", ["--time-column", "1"],
+        "log.csv:1: column 'elapsed [min]' is in min by its name; convert it to s, or give --time-unit"),
+    "angles_of_no_angles": ({}, [*WITH_POSES, "--euler", "xyz"],
+        "poses.csv: its poses are of another form than --euler or --matrix is for"),
+    "a_matrix_of_no_matrices": ({}, [*WITH_POSES, "--matrix", "rows"],
+        "poses.csv: its poses are of another form than --euler or --matrix is for"),
+    "angles_of_no_poses": ({}, ["--euler", "xyz"], "--euler xyz: is for poses; give --poses"),
     "a_sideways_array": ({"poses.csv": "time_s,x_mm,y_mm,roll_deg,pitch_deg,yaw_deg\n0,0,0,0,90,0\n"}, WITH_POSES,
         "poses.csv:2: column 'pitch_deg': the array is turned by 90 degrees out of the xy plane"),
     "a_rotation_vector_of_a_tool_that_points_down": ({"poses.csv": "time,x,y,z,rx,ry,rz\n0,0,0,5,2.2,2.2,0\n"},
