@@ -1,6 +1,7 @@
 #include "recognition/belief_modes.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <span>
@@ -8,8 +9,11 @@
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
+#include <glm/gtc/type_ptr.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+
+#include "model/body_spread.hpp"
 
 namespace palpate::belief_modes_test {
 
@@ -190,6 +194,21 @@ TEST(PartsAway, NearThePoseLieAsItsCovarianceSaysWhateverTheBin) {
     EXPECT_NEAR(distance_holding(parts, 0.9 * share).value(),
                 0.2 * std::sqrt(-2.0 * std::log(1.0 - share)), 0.01);
   }
+}
+
+TEST(PartsAway, LieAsNearWhereverTheRobotsOriginIs) {
+  const BinnedObject of = letter();
+  const Pose near = of.lattice.T_object_robot(3.0, -1.0, 2.0);
+  const std::array<double, 9> covariance{0.04, 0.0, 0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 1e-3};
+  const glm::dvec2 away_mm(800.0, -600.0);
+  glm::dmat3 jacobian{1.0};  // by columns
+  jacobian[2] = {-rotate(near.theta_rad + std::numbers::pi / 2.0, away_mm), 1.0};
+  const RefinedPose far{near * Pose{-away_mm, 0.0},
+                        carried_over(glm::make_mat3(covariance.data()), jacobian)};
+  const auto held_mm = [&](const RefinedPose& refined) {
+    return distance_holding(spread_between_bins(of, {{0.4, 1.0}}, refined), 0.9).value();
+  };
+  EXPECT_NEAR(held_mm(far), held_mm({near, covariance}), 1e-6);
 }
 
 }  // namespace palpate::belief_modes_test

@@ -3,7 +3,9 @@
 #include "recognition/placement_judge.hpp"
 
 #include <memory>
+#include <numbers>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 
@@ -107,8 +109,12 @@ TEST_F(PlacementJudge, LeavesExactTouchesToBeActedOn) {
 }
 
 TEST_F(PlacementJudge, SaysAfterWhichTouchAnObjectMovedAndByHowMuch) {
-  for (const double mm : {2.0, 9.0}) {
-    const RecognitionStep step = letters_->last_step(moved(5, {0.6 * mm, 0.8 * mm}));
+  for (const auto& [mm, turns] : {std::pair{2.0, 0}, {9.0, 0}, {2.0, 2}}) {
+    Recording touches = moved(5, {0.6 * mm, 0.8 * mm});
+    for (Pose& pose : touches.T_robot_sensor) {
+      pose.theta_rad += turns * 2.0 * std::numbers::pi;  // which has a warning of its own
+    }
+    const RecognitionStep step = letters_->last_step(touches);
     EXPECT_FALSE(step.decision.act);
     EXPECT_THAT(step.decision.because, HasSubstr(" after touch 5")) << mm;
     EXPECT_THAT(step.warnings, Contains(HasSubstr("seems to have moved by ")));

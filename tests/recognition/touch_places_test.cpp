@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
@@ -45,6 +46,11 @@ constexpr double an_element = 1.5 / 36.0;
 TEST(TouchPlaces, CountATouchThatIsWrittenAgainOnce) {
   const TouchEvidence touch = touch_at({{3.0, 4.0}, 0.5});
   EXPECT_EQ(shares({touch, touch, touch}), (std::vector{1.0, 0.0, 0.0}));
+}
+
+TEST(TouchPlaces, LeaveATouchItsWeightWhereOneBeforeItTellsNothing) {
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(shares({touch_at({}, 36, unknown), touch_at({}, 0)}), (std::vector{0.0, 1.0}));
 }
 
 TEST(TouchPlaces, CountFurtherTouchesByTheSquareOfTheirDistance) {
