@@ -144,6 +144,11 @@ struct ClockStep {
   double to_s = 0.0;
 };
 
+/// The year 5138: no time in s is later; one in ms is.
+inline constexpr double latest_time_s = 1e11;
+/// What to say of rows left out since they repeat a time. @param kept "pose is" or "readings are"
+std::string repeated_words(std::size_t rows, const char* kept);
+
 /// Reads the times of a table's rows, in numbers or as clocks write them.
 class TableTimes {
  public:
@@ -152,8 +157,7 @@ class TableTimes {
   /// Returns the row's time in seconds, and notes where it is earlier than that of the row before.
   /// Times of day go on after midnight.
   /// @param row of those that are read
-  /// @throws Error where the cell holds no time, or more than ten rows are earlier than the row
-  /// before
+  /// @throws Error where the cell holds no time
   double next(std::size_t row);
 
   std::vector<ClockStep> steps;
