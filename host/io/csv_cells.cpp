@@ -66,10 +66,17 @@ std::string_view without_comment(std::string_view line) {
     return line;
   }
   for (std::size_t at = 0; at < line.size(); ++at) {
+    const std::string_view before = line.substr(0, at);
     if (line[at] == '"') {
       at = std::min(closing_quote(line, at), line.size());
-    } else if (line[at] == '#' && (at == 0 || blanks.find(line[at - 1]) != blanks.npos)) {
-      return line.substr(0, at);
+    } else if (line[at] == '#' && trimmed(before).empty()) {
+      return before;
+    } else if (line[at] == '#' && blanks.find(before.back()) != blanks.npos) {
+      const char separator = separator_of(before);
+      const auto cells = cells_in(before, separator);
+      if (!cells.empty() && is_numeric(cells.back(), separator)) {
+        return before;
+      }
     }
   }
   return line;
@@ -84,12 +91,17 @@ char separator_of(std::string_view line) {
       bare += line[at];
     }
   }
-  for (const char separator : {'\t', ';', ','}) {
+  for (const char separator : {'\t', ';'}) {
     if (bare.find(separator) != bare.npos) {
       return separator;
     }
   }
-  return ' ';
+  // Numbers with decimal commas between blanks are none between commas.
+  const auto by_blanks = cells_in(bare, ' ');
+  return bare.find(',') == bare.npos || (by_blanks.size() > 1 && are_numbers(by_blanks, ' ') &&
+                                         !are_numbers(cells_in(bare, ','), ','))
+             ? ' '
+             : ',';
 }
 
 const char* split_cells(std::string_view line, char separator,

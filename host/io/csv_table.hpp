@@ -49,7 +49,7 @@ class TextLines {
 /// that has as many cells as most of the first 200 lines; what stands before it is skipped, and
 /// `sep=;` names the separator, as spreadsheets write it. The first row is the header where it
 /// holds names and no number, or where its numbers count 0, 1, 2, ... (five at least); "inf" and
-/// "nan" are numbers. '#' at the start of a line or after a blank begins a comment. Empty lines, a
+/// "nan" are numbers. '#' at the start of a line or after a number begins a comment. Empty lines, a
 /// byte order mark, UTF-16, CRLF, quotes around a cell and a separator after the last cell of a row
 /// are accepted; so are decimal commas where commas do not separate. Every error is one line that
 /// names the file, the line and the column.
