@@ -54,6 +54,8 @@ struct TableOptions {
   std::optional<std::array<std::size_t, 2>> grid = {};
   /// Set by import_tables(): each frame may be a block of rows, as the array has them.
   bool has_blocks = false;
+  /// Set by import_tables(): rows of one time are all kept.
+  bool keeps_repeated = false;
 };
 
 /// @throws Error naming the option whose value makes no sense

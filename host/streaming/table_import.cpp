@@ -241,6 +241,7 @@ ImportedRecording import_tables(const ImportOptions& options) {
   TableOptions of_pressures = options;
   of_pressures.grid = grid_size(options);
   of_pressures.has_blocks = options.rows == "frames";
+  of_pressures.keeps_repeated = one_file || options.rows == "touches";
   of_pressures.pose_columns = one_file ? options.pose_columns : "";
   TableOptions of_poses = options;
   of_poses.header_line = one_file ? options.header_line : 0;
@@ -253,7 +254,8 @@ ImportedRecording import_tables(const ImportOptions& options) {
     // The rows of one file belong together, even where their times are equal.
     rows.poses = read_poses(options.poses, of_poses, !one_file);
     if (one_file && options.pose_delay_s != 0.0 &&
-        rows.pressures.time_s.size() == rows.poses->T_robot_sensor.size()) {
+        rows.pressures.time_s.size() ==
+            rows.poses->T_robot_sensor.size() + rows.poses->spatial.size()) {
       rows.poses->time_s = rows.pressures.time_s;
       rows.poses->steps = rows.pressures.steps;
     }
