@@ -163,12 +163,12 @@ void require_counting_names(const CsvTable& table, const PressureColumns& readin
     const auto differ = std::ranges::mismatch(before, name).in1 - before.begin();
     const std::size_t begin =
         before.substr(0, static_cast<std::size_t>(differ)).find_last_not_of(digits) + 1;
-    const auto number_in = [&](std::string_view text) {  // and what follows it
+    const auto number_at = [&](std::string_view text) {  // and what follows it
       const std::size_t end = std::min(text.find_first_not_of(digits, begin), text.size());
       return std::pair{whole_number_of(text.substr(begin, end - begin)), text.substr(end)};
     };
-    const auto [first, rest_of_first] = number_in(before);
-    const auto [second, rest] = number_in(name);
+    const auto [first, rest_of_first] = number_at(before);
+    const auto [second, rest] = number_at(name);
     if (first && second && *second <= *first && (rest == rest_of_first || before < name)) {
       table.refuse_columns(
           "column '{}' comes after '{}'; order the columns as the array's elements, or name them "

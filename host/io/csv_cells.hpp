@@ -41,8 +41,9 @@ struct TableStart {
   char separator = ',';
 };
 
-/// Finds the table in the first lines of a text: most of them are its rows, which have equally many
-/// cells, and the first line with as many is its header, unless less than half of it is filled.
+/// Finds the table in the first lines of a text: its rows have equally many cells, as most of the
+/// lines have, or those below other lines that have fewer or another separator; the first line with
+/// as many is its header, unless less than half of it is filled.
 /// @param lines none blank, without comments; at least one
 TableStart find_table(const std::vector<std::string>& lines);
 

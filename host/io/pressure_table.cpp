@@ -111,7 +111,8 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
     }
   }
   if (repeated > 0) {
-    all.understood.push_back(repeated_words(repeated, "readings are"));
+    all.understood.push_back(fmt::format(
+        "{} of its rows repeat the time of the row before, whose readings are kept", repeated));
   }
   all.steps = std::move(times.steps);
   return all;

@@ -34,8 +34,8 @@ inline constexpr std::array<Unit, 2> angle_units{{{"rad"}, {"deg", std::numbers:
 
 /// What the options say about the columns, rows and units of tables; "" where one is not given.
 struct TableOptions {
-  /// Of the table (of an import: of the pressures), from 1; 0: found.
-  std::uint64_t header_line = 0;
+  /// Of the table (of an import: of the pressures), from 1; 0: found; none: no option gives it.
+  std::optional<std::uint64_t> header_line = 0;
   /// COLUMN=VALUE: of a table with this column, only rows with this value.
   std::vector<std::string> where;
   std::string time_column;       ///< "": the usual names
@@ -148,8 +148,6 @@ struct ClockStep {
 
 /// The year 5138: no time in s is later; one in ms is.
 inline constexpr double latest_time_s = 1e11;
-/// What to say of rows left out since they repeat a time. @param kept "pose is" or "readings are"
-std::string repeated_words(std::size_t rows, const char* kept);
 
 /// Reads the times of a table's rows, in numbers or as clocks write them.
 class TableTimes {

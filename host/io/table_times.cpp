@@ -110,10 +110,6 @@ std::optional<double> clock_time_of(std::string_view text, bool& of_day) {
 
 }  // namespace
 
-std::string repeated_words(std::size_t rows, const char* kept) {
-  return fmt::format("{} of its rows repeat the time of the row before, whose {} kept", rows, kept);
-}
-
 double TableTimes::next(std::size_t row) {
   const std::string_view text = table_.text(column_.index);
   double time_s = 0.0;

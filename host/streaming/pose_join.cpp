@@ -120,16 +120,6 @@ struct TableClock {
   }
 };
 
-/// @param limit of steps, and why there are no more
-void require_few(const TableClock& clock, std::size_t limit, const std::string& why) {
-  if (clock.steps.size() > limit) {
-    const ClockStep& step = clock.steps.front();
-    refuse(fmt::format("{}:{}", clock.path, step.line),
-           "{} s is earlier than the row before, at {} s, and {}; sort the rows by time", step.to_s,
-           step.from_s, why);
-  }
-}
-
 }  // namespace
 
 bool in_one_file(const ImportOptions& options) {
@@ -178,13 +168,19 @@ std::vector<std::string> lay_out_stretches(const ImportOptions& options, Pressur
   if (poses && !poses->time_s.empty()) {
     clocks.push_back({options.poses, poses->time_s, poses->steps});
   }
+  // Rows that are not sorted step back more often than a clock is set.
+  constexpr std::size_t most_steps = 10;
   for (const TableClock& clock : clocks) {
-    // Rows that are not sorted step back more often than a clock is set.
-    constexpr std::size_t most_steps = 10;
-    require_few(clock, most_steps, fmt::format("so are more than {} rows", most_steps));
     for (const TableClock& other : clocks) {
-      require_few(clock, other.steps.size(),
-                  fmt::format("the clock of {} does not step back with it", other.path));
+      if (clock.steps.size() > std::min(most_steps, other.steps.size())) {
+        const ClockStep& step = clock.steps.front();
+        refuse(fmt::format("{}:{}", clock.path, step.line),
+               "{} s is earlier than the row before, at {} s, and {}; sort the rows by time",
+               step.to_s, step.from_s,
+               clock.steps.size() > most_steps
+                   ? fmt::format("so are more than {} rows", most_steps)
+                   : fmt::format("the clock of {} does not step back with it", other.path));
+      }
     }
   }
   std::string lines;

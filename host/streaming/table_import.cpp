@@ -36,11 +36,6 @@ void require_touch_poses(const ImportOptions& options, const ImportedRecording& 
   }
 }
 
-/// True where a table of this name is given and has the column.
-bool has_column(const std::string& path, const std::string& name) {
-  return !path.empty() && CsvTable(path).find_or_count(name);
-}
-
 /// @param n rows
 void choose_rows(const ImportOptions& options, std::size_t n, Recording& recording) {
   if (options.rate_hz) {
@@ -225,9 +220,12 @@ ImportedRecording import_tables(const ImportOptions& options) {
   validate(options);
   check_numbers(options);
   Recording array = import_array(options);
+  const bool one_file = in_one_file(options);
   const auto require_column = [&](const std::string& option, const std::string& name) {
-    if (!has_column(options.pressures, name) && !has_column(options.poses, name)) {
-      refuse(fmt::format("`{}`", option), "no table has this column; give its name");
+    const CsvTable pressures(options.pressures, options.header_line);
+    if (!pressures.find_or_count(name) &&
+        (one_file || options.poses.empty() || !CsvTable(options.poses).find_or_count(name))) {
+      pressures.refuse_columns("`{}`: no table has this column; give its name", option);
     }
   };
   if (!options.time_column.empty()) {
@@ -237,14 +235,13 @@ ImportedRecording import_tables(const ImportOptions& options) {
     require_column(fmt::format("where {}={}", name, value), name);
   }
   // The poses may have a table of their own, with other columns and another header.
-  const bool one_file = in_one_file(options);
   TableOptions of_pressures = options;
   of_pressures.grid = grid_size(options);
   of_pressures.has_blocks = options.rows == "frames";
   of_pressures.keeps_repeated = one_file || options.rows == "touches";
   of_pressures.pose_columns = one_file ? options.pose_columns : "";
   TableOptions of_poses = options;
-  of_poses.header_line = one_file ? options.header_line : 0;
+  of_poses.header_line = one_file ? options.header_line : std::nullopt;
   ImportRows rows{.pressures =
                       read_pressures(options.pressures, array.elements_mm.size(), of_pressures)};
   const Unit length_unit = given_unit(options, length_units).value_or(length_units.front());

@@ -79,8 +79,7 @@ std::optional<SpatialPose> spatial_pose(std::span<const double> row, const std::
       std::ranges::any_of(row, [](double number) { return !std::isfinite(number); })) {
     return {};
   }
-  constexpr double rounding = 1e-2;
-  if (std::abs(length - 1.0) > rounding) {
+  if (std::abs(length - 1.0) > 1e-2) {
     refuse(place, "the quaternion's length is {:.4g}, so that it is no rotation; give x, y, z, w",
            length);
   }
@@ -91,15 +90,14 @@ std::optional<SpatialPose> spatial_pose(std::span<const double> row, const std::
 /// columns, rows].
 Floats readings_of(ArrayReader& reader, const ArrayLike& given, const ImportOptions& options) {
   if (nb::cast<int>(call("numpy", "ndim", given)) != 3) {
-    return reader.floats(given, "pressures", {"n", "e"});
+    return reader.known(given, "pressures", {"n", "e"});
   }
   const auto grid = run([&] { return grid_size(options); });
-  std::array sides{grid ? std::to_string((*grid)[1]) : "rows",
-                   grid ? std::to_string((*grid)[0]) : "columns"};
-  if (options.order == "columns") {
-    std::swap(sides[0], sides[1]);
-  }
-  Floats readings = reader.floats(given, "pressures", {"n", sides[0].c_str(), sides[1].c_str()});
+  const std::string columns = grid ? std::to_string((*grid)[0]) : "columns";
+  const std::string rows = grid ? std::to_string((*grid)[1]) : "rows";
+  const auto& [outer, inner] =
+      options.order == "columns" ? std::tie(columns, rows) : std::tie(rows, columns);
+  Floats readings = reader.known(given, "pressures", {"n", outer.c_str(), inner.c_str()});
   readings.shape = {readings.shape[0], readings.shape[1] * readings.shape[2]};
   return readings;
 }
@@ -157,7 +155,8 @@ Imported import_frames(const ImportOptions& options, const ArrayLike& pressures,
           spatial_pose(all.values().subspan(7 * i, 7), fmt::format("{}[{}]", options.poses, i)));
     }
     if (const std::size_t repeated = all.shape[0] - rows.poses->spatial.size(); repeated > 0) {
-      rows.poses->understood.push_back(repeated_words(repeated, "pose is"));
+      rows.poses->understood.push_back(fmt::format(
+          "{} of its rows repeat the time of the row before, whose pose is kept", repeated));
     }
     rows.poses->steps = steps_in(kept_s, "pose_time_s");
   }

@@ -266,9 +266,9 @@ def import_tables(
 ) -> Recording:
     """Makes a recording from tables, as `palpate import` does; docs/files.md describes them.
 
-    pressures: a CSV file, or readings [n, e] or [n, rows, columns] (by order="columns" [n, columns, rows])
-    with their times time_s [n] in s, where NaN is unknown; array: (columns, rows, pitch_mm), a CSV file, or the elements' centres [e, 2] in mm in the sensor frame, in the order
-    of their readings; first_element and order: where the first element of a grid lies, seen with x to
+    pressures: a CSV file, or readings [n, e] or [n, rows, columns] (order="columns": [n, columns, rows]) with
+    their times time_s [n] in s, where NaN is unknown; array: (columns, rows, pitch_mm), a CSV file, or the
+    elements' centres [e, 2] in mm in the sensor frame, in the order of their readings; first_element and order: where the first element of a grid lies, seen with x to
     the right and y upwards, and which follow it; dead: elements that do not read, from 0; sign: -1
     where readings fall under load, which are taken times -1; poses: a CSV
     file of T_robot_sensor, in mm and rad where neither its columns' names nor pose_unit say otherwise, or,
