@@ -114,8 +114,12 @@ READ = {
         [], READINGS, said=["log.csv: 2 lines before line 4 ('time', 'p0', 'p1') are left out (--header-line)"]),
     "lines_filled_up_by_a_spreadsheet": Case("Device,5,,\nOperator,A,,\ntime,p0,p1,\n0,1,2,\n.1,3,4,\n", [], READINGS,
         said=["2 lines before line 3"]),
-    "a_header_line_that_is_given": Case("a,b,c\ntime,p0,p1\n0,1,2\n.1,3,4\n", ["--header-line", "2"], READINGS,
-        times=[0, 0.1]),
+    "a_header_line_that_is_given": Case("a,a,c\nwhen,p0,p1\n0,1,2\n.1,3,4\n",
+        ["--header-line", "2", "--time-column", "when"], READINGS, times=[0, 0.1]),
+    "a_short_table_below_more_lines": Case("K;0\nK;1\nK;2\nK;3\ntime;p0;p1\n0;1;2\n0,1;3;4\n", [], READINGS,
+        said=["4 lines before line 5 ('time', 'p0', 'p1')"]),
+    "numbers_before_the_header": Case("2,1\ntime,p0,p1\n0,1,2\n.1,3,4\n", [], READINGS, times=[0, 0.1]),
+    "an_empty_row_before_the_header": Case(";;\ntime;p0;p1\n0;1;2\n0,1;3;4\n", [], READINGS, times=[0, 0.1]),
     "sep_and_decimal_commas": Case("sep=;\r\ntime;p0;p1\r\n0;1,0;2\r\n0,1;3;4\r\n", [], READINGS, times=[0, 0.1]),
     "decimal_commas_between_blanks": Case("time p0 p1\n0,0 1,0 2\n0,1 3 4 # last\n", [], READINGS, times=[0, 0.1]),
     "utf_16": Case("time\tp0\tp1\r\n0\t1\t2\r\n0,1\t3\t4\r\n".encode("utf-16"), [], READINGS, times=[0, 0.1]),
@@ -137,7 +141,7 @@ READ = {
         said=["1 of its rows repeat the time of the row before, whose readings are kept"]),
     "a_step_back_over_midnight": Case(
         "time,p0,p1\n23:59:59.5,1,2\n00:00:00,3,4\n23:59:59.75,1,2\n23:59:59.5,3,4\n", [], READINGS * 2,
-        times=[86399.5, 86400, 86410, 86420], said=["log.csv:4: the clock steps back from 86400 to 86399.75 s, as at lines 4, 5 (2 times)"]),
+        times=[86399.5, 86400, 86410, 86420], said=["back from 86400 to 86399.75 s, as at lines 4, 5 (2 times)"]),
     "a_delay_in_one_file": Case("time,p0,p1,x,y,z,roll,pitch,yaw\n0,1,2,0,20,5,0,0,0\n.1,3,4,10,20,5,0,0,0\n",
         ["--poses", "log.csv", "--pose-delay", "-.05", "--pose-unit", "mm,rad"], poses=[[NAN] * 3, [5, 20, 0]]),
     "a_clock_that_steps_back": Case({"log.csv": "time,p0,p1\n5,1,2\n6,3,4\n0.5,1,2\n1.5,3,4\n",
@@ -247,7 +251,7 @@ REFUSED: dict[str, tuple["Files | str | bytes", list[str], str]] = {
         [*WITH_POSES, "--largest-gap-s", "0.03"],
         "poses.csv: no row of log.csv finds a pose: its times are 0 to 0.1 s, the poses' are 0.01 to 0.08 s; check "
         "clocks and units, or raise --largest-gap-s"),
-    "no_such_column_to_keep": ({}, ["--where", "id=2"], "--where id=2: no table has this column; give its name"),
+    "no_such_column_to_keep": ({}, ["--where", "id=2"], "--where id=2: no table has this column"),
     "no_such_header_line": ({}, ["--header-line", "9"], "--header-line 9: log.csv has no such line"),
     "three_axes_unsaid": ("time,x0,y0,z0,x1,y1,z1\n0,8,9,1,8,9,2\n", [],
         "log.csv:1: 6 columns of pressure ('x0' to 'z1') for an array of 2 elements; where each element reads x, y "
@@ -281,7 +285,8 @@ REFUSED: dict[str, tuple["Files | str | bytes", list[str], str]] = {
     "array_without_columns": ({}, ["--array", "0:1:2"], "--array 0:1:2: give COLUMNS:ROWS:PITCH, with 1 to 1024"),
     "output_over_input": ({}, ["-o", "log.csv"], "-o log.csv: would overwrite log.csv, which PRESSURES reads"),
     "no_column_of_times": (poses("x,y,theta", "0,5,-1"), [*WITH_POSES, "--time-column", "stmap"],
-        "--time-column stmap: no table has this column"),
+        "log.csv:1: --time-column stmap: no table has this column; give its name; the header there is 'time', 'p0', "
+        "'p1' (or give --header-line)"),
     "no_column_of_times_in_touches": ("p0,p1\n1,2\n", ["--time-column", "when"],
         "--time-column when: no table has this column"),
 }  # fmt: skip
@@ -331,13 +336,15 @@ def test_a_log_that_makes_no_recording_is_refused(name: str, tmp_path: pathlib.P
 
 def test_a_column_of_labels_makes_a_recording_each_or_none(tmp_path: pathlib.Path) -> None:
     """Values of which only kept rows have some make no recording; where one is refused, none is written."""
-    log = "time,p0,p1,label,id\n0,1,2,cup,1\n.1,3,4,key,2\n.2,5,6,1,1\n.3,5,6,1.0,1\n"
-    assert imported(tmp_path, log, ["--split", "label", "--where", "id=1"]).returncode == 0
+    log = "time;p0;p1;label;id\n0;1;2;cup;1\n.1;3;4;key;2\n.2;5;6;1;1\n.3;5;6;1,0;1\n.35;7;8;;1\n"
+    done = imported(tmp_path, log, ["--split", "label", "--where", "id=1"])
+    assert "log.csv: 1 rows without a value of 'label' are left out (--split)" in done.stderr
     assert sorted(file.name for file in tmp_path.glob("*.h5")) == ["o-1.h5", "o-cup.h5"]
     one, cup = (palpate.read_recording(tmp_path / f"o-{label}.h5") for label in ("1", "cup"))
     assert (one.object, one.pressure.tolist()) == ("1", [[5, 6], [5, 6]])
     assert (cup.object, cup.pressure.tolist()) == ("cup", [[1, 2]])
-    for name, bad in (("x", log + ".4,abc,6,late,1\n"), ("y", log + ".4,1,2,a/b,1\n.5,1,2,a_b,1\n")):
+    for name, bad in (("x", log + ".4;abc;6;late;1\n"), ("y", log + ".4;1;2;a/b;1\n.5;1;2;a_b;1\n"),
+                      ("z", log + f".4;1;2;{'L' * 250};1\n")):  # fmt: skip
         done = imported(tmp_path, bad, ["--split", "label", "-o", f"{name}.h5"])
         expect_refused(done, "")
         assert not list(tmp_path.glob(f"{name}-*.h5"))
