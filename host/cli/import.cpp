@@ -16,7 +16,7 @@
 #include "io/recording_rules.hpp"
 #include "io/recording_survey.hpp"
 #include "io/table_columns.hpp"
-#include "model/number_text.hpp"
+#include "model/printable.hpp"
 #include "palpate/files.hpp"
 #include "streaming/table_import.hpp"
 
@@ -27,6 +27,7 @@ namespace {
 struct ImportArguments : ImportOptions {
   std::string output;
   std::string split;
+  std::uint64_t unlabelled = 0;  ///< rows that `split` leaves out: values_in() counts them
 };
 
 /// The command that takes the recording.
@@ -103,7 +104,7 @@ void write(const ImportArguments& options, const ImportedRecording& tables) {
 }
 
 /// The values in the column that splits the rows, each once, in their order; 1 and 1.0 are one.
-std::vector<std::string> values_in(const ImportArguments& options) {
+std::vector<std::string> values_in(ImportArguments& options) {
   constexpr std::size_t limit = 1000;
   validate(options);
   CsvTable table = open_table(options.pressures, options);
@@ -114,9 +115,8 @@ std::vector<std::string> values_in(const ImportArguments& options) {
   std::vector<std::string> values;
   while (table.next()) {
     const std::string_view text = table.text(*column);
-    const auto is_same = [&](const std::string& value) {
-      return value == text || (number_of(text) && number_of(value) == number_of(text));
-    };
+    options.unlabelled += text.empty() ? 1 : 0;
+    const auto is_same = [&](const std::string& value) { return table.holds(*column, value); };
     if (!text.empty() && std::ranges::none_of(values, is_same)) {
       values.emplace_back(text);
     }
@@ -139,7 +139,7 @@ std::string output_of(const std::string& output, std::string value) {
 }
 
 /// The imports that are asked for: one, or one for each value of the column that splits the rows.
-std::vector<ImportArguments> imports_of(const ImportArguments& options) {
+std::vector<ImportArguments> imports_of(ImportArguments options) {
   if (options.split.empty()) {
     return {options};
   }
@@ -152,6 +152,11 @@ std::vector<ImportArguments> imports_of(const ImportArguments& options) {
     if (std::ranges::find(imports, one.output, &ImportArguments::output) != imports.end()) {
       refuse(options.pressures, "`split {}`: two values would be written to {}; rename one",
              options.split, one.output);
+    }
+    constexpr std::size_t longest_name = 255;  // of a file
+    if (std::filesystem::path(one.output).filename().string().size() > longest_name) {
+      refuse(options.pressures, "`split {}`: '{}...' is too long for a file's name; shorten it",
+             options.split, printable(value.substr(0, 20)));
     }
     imports.push_back(std::move(one));
   }
@@ -176,6 +181,10 @@ void import_tables(const ImportArguments& options) {
   }
   for (const auto& [one, tables] : all) {
     write(one, tables);
+  }
+  if (const std::uint64_t rows = all.front().first.unlabelled; rows > 0) {
+    tell_on_stderr(fmt::format("{}: {} rows without a value of '{}' are left out (--split)",
+                               options.pressures, rows, options.split));
   }
 }
 

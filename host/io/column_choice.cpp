@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <optional>
@@ -152,21 +153,27 @@ class Choice {
   const char* option_;
 };
 
-// Columns in the order in which they were named: p1 and p10 side by side come from names that were
-// sorted as texts.
-void require_counting_names(const CsvTable& table, const std::vector<std::size_t>& columns) {
-  const auto split = [&](std::size_t column) {
-    const std::string_view name = table.columns()[column];
-    const std::size_t digits = name.find_last_not_of("0123456789") + 1;
-    return std::pair{name.substr(0, digits), whole_number_of(name.substr(digits))};
-  };
-  for (std::size_t i = 1; i < columns.size(); ++i) {
-    const auto [before, number_before] = split(columns[i - 1]);
-    const auto [stem, number] = split(columns[i]);
-    if (stem == before && number && number_before && *number <= *number_before) {
+// Columns in the order in which they were named: p1 and p10 side by side, or p10_z before p2_z,
+// come from names that were sorted as texts.
+void require_counting_names(const CsvTable& table, const PressureColumns& readings) {
+  constexpr std::string_view digits = "0123456789";
+  for (std::size_t i = 1; i < readings.size(); ++i) {
+    const std::string_view before = table.columns()[readings[i - 1].back()];
+    const std::string_view name = table.columns()[readings[i].back()];
+    const auto differ = std::ranges::mismatch(before, name).in1 - before.begin();
+    const std::size_t begin =
+        before.substr(0, static_cast<std::size_t>(differ)).find_last_not_of(digits) + 1;
+    const auto number_at = [&](std::string_view text) {  // and what follows it
+      const std::size_t end = std::min(text.find_first_not_of(digits, begin), text.size());
+      return std::pair{whole_number_of(text.substr(begin, end - begin)), text.substr(end)};
+    };
+    const auto [first, rest_of_first] = number_at(before);
+    const auto [second, rest] = number_at(name);
+    if (first && second && *second <= *first && (rest == rest_of_first || before < name)) {
       table.refuse_columns(
-          "column '{}' comes after '{}'; order the columns as the array's elements",
-          printable(table.columns()[columns[i]]), printable(table.columns()[columns[i - 1]]));
+          "column '{}' comes after '{}'; order the columns as the array's elements, or name them "
+          "one by one by `pressure-columns`",
+          printable(name), printable(before));
     }
   }
 }
@@ -233,10 +240,10 @@ std::vector<std::size_t> choose_columns(const CsvTable& table, const std::string
 PressureColumns pressure_columns(const CsvTable& table, const std::vector<std::size_t>& columns,
                                  std::size_t elements, const TableOptions& options) {
   const bool has_axes = columns.size() == 3 * elements;
+  PressureColumns readings;
   if (has_axes && !options.pressure_component.empty()) {
-    return axes_of(table, columns);
-  }
-  if (columns.size() != elements || !options.pressure_component.empty()) {
+    readings = axes_of(table, columns);
+  } else if (columns.size() != elements || !options.pressure_component.empty()) {
     const std::string span =
         columns.empty() || !table.has_header()
             ? ""
@@ -251,11 +258,13 @@ PressureColumns pressure_columns(const CsvTable& table, const std::vector<std::s
         : options.pressure_component.empty()
             ? "; correct `array`, or name the columns by `pressure-columns`"
             : "; `pressure-component` takes three columns, x, y and z, of each");
+  } else {
+    std::ranges::transform(columns, std::back_inserter(readings),
+                           [](std::size_t column) { return std::vector{column}; });
   }
-  require_counting_names(table, columns);
-  PressureColumns readings;
-  for (const std::size_t column : columns) {
-    readings.push_back({column});
+  // Columns that are named one by one are in the order that is meant.
+  if (split_text(options.pressure_columns, ',').size() != columns.size()) {
+    require_counting_names(table, readings);
   }
   return readings;
 }

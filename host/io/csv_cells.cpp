@@ -66,10 +66,17 @@ std::string_view without_comment(std::string_view line) {
     return line;
   }
   for (std::size_t at = 0; at < line.size(); ++at) {
+    const std::string_view before = line.substr(0, at);
     if (line[at] == '"') {
       at = std::min(closing_quote(line, at), line.size());
-    } else if (line[at] == '#' && (at == 0 || blanks.find(line[at - 1]) != blanks.npos)) {
-      return line.substr(0, at);
+    } else if (line[at] == '#' && trimmed(before).empty()) {
+      return before;
+    } else if (line[at] == '#' && blanks.find(before.back()) != blanks.npos) {
+      const char separator = separator_of(before);
+      const auto cells = cells_in(before, separator);
+      if (!cells.empty() && is_numeric(cells.back(), separator)) {
+        return before;
+      }
     }
   }
   return line;
@@ -86,7 +93,11 @@ char separator_of(std::string_view line) {
   }
   for (const char separator : {'\t', ';', ','}) {
     if (bare.find(separator) != bare.npos) {
-      return separator;
+      // Numbers with decimal commas between blanks are none between commas.
+      const auto cells = cells_in(bare, ' ');
+      const bool is_decimal = separator == ',' && cells.size() > 1 && are_numbers(cells, ' ') &&
+                              !are_numbers(cells_in(bare, ','), ',');
+      return is_decimal ? ' ' : separator;
     }
   }
   return ' ';
@@ -167,40 +178,41 @@ TableStart find_table(const std::vector<std::string>& lines) {
   // Rows have one separator and one width; what comes before them has others.
   const char own = separator_of(lines.front());
   if (const auto cells = cells_in(lines.front(), own);
-      cells.size() > 1 && are_numbers(cells, own)) {
+      cells.size() > 1 && are_numbers(cells, own) && !is_half_empty(cells) &&
+      (lines.size() == 1 || cells_in(lines[1], own).size() == cells.size())) {
     return {.first = 0, .separator = own};
   }
-  std::map<std::pair<char, std::size_t>, std::size_t> counts;
+  // Of a separator and a width: how many lines, and the first of them.
+  std::map<std::pair<char, std::size_t>, std::pair<std::size_t, std::size_t>> forms;
   std::pair<char, std::size_t> shape{own, 0};
   std::size_t largest = 0;
-  for (const std::string& line : lines) {
-    const char separator = separator_of(line);
-    const auto cells = cells_in(line, separator);
-    const std::size_t width = cells.size();
-    // A line "Key: value" is no row, however many there are before a short table.
-    const std::size_t weight = width > 1 && are_numbers(cells, separator) ? 10 : 1;
-    const std::size_t count = width == 0 ? 0 : counts[{separator, width}] += weight;
+  std::size_t last = 0;  // of this shape
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const char separator = separator_of(lines[i]);
+    const std::size_t width = cells_in(lines[i], separator).size();
+    auto& [count, first] = forms.try_emplace({separator, width}, 0, i).first->second;
+    count += width == 0 ? 0 : 1;
+    const bool is_below = count > 1 && first > last &&
+                          (separator == shape.first ? width > shape.second : separator != ' ');
     // Of shapes as frequent the one that comes last, but for lines that have no separator.
-    if (count > largest || (count == largest && width > 1)) {
+    if (count > largest || (count == largest && width > 1) || is_below) {
       largest = count;
       shape = {separator, width};
     }
+    last = shape == std::pair{separator, width} ? i : last;
   }
   const char separator = shape.first;
-  const std::size_t width = shape.second;
   TableStart start{.first = 0, .separator = separator};
   const auto has_width = [&](std::size_t i) {
-    return cells_in(lines[i], separator).size() == width;
+    return cells_in(lines[i], separator).size() == shape.second;
   };
+  bool is_row = false;  // one that is short, not a line before a table
   while (start.first < lines.size() && !has_width(start.first)) {
-    const auto cells = cells_in(lines[start.first], separator);
-    if (cells.size() > 1 && are_numbers(cells, separator)) {
-      return {.first = 0,
-              .separator = separator};  // a row that is short, not a line before a table
-    }
-    ++start.first;
+    const auto cells = cells_in(lines[start.first++], separator);
+    is_row = is_row || (cells.size() > 1 && are_numbers(cells, separator));
   }
-  if (start.first == lines.size()) {
+  if (start.first == lines.size() ||
+      (is_row && !is_header(cells_in(lines[start.first], separator), separator))) {
     return {.first = 0, .separator = separator};
   }
   // A spreadsheet fills up the lines before its table with empty cells.

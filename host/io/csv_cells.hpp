@@ -14,10 +14,12 @@ bool alike(std::string_view a, std::string_view b);
 /// The text without the blanks around it.
 std::string_view trimmed(std::string_view text);
 
-/// The line up to its comment: '#' at its start or after a blank, not in quotes.
+/// The line up to its comment: '#' at its start, or after a number and a blank, not in quotes.
+/// Names and labels may hold one, as in 'mug #2'.
 std::string_view without_comment(std::string_view line);
 
-/// What separates the cells of a row: tabs, else semicolons, else commas, else blanks.
+/// What separates the cells of a row: tabs, else semicolons, else commas, unless these are decimal
+/// ones of numbers between blanks, else blanks.
 char separator_of(std::string_view line);
 
 /// Splits a row into its cells, without the quotes and blanks around them.
@@ -39,8 +41,9 @@ struct TableStart {
   char separator = ',';
 };
 
-/// Finds the table in the first lines of a text: most of them are its rows, which have equally many
-/// cells, and the first line with as many is its header, unless less than half of it is filled.
+/// Finds the table in the first lines of a text: its rows have equally many cells, as most of the
+/// lines have, or those below other lines that have fewer or another separator; the first line with
+/// as many is its header, unless less than half of it is filled.
 /// @param lines none blank, without comments; at least one
 TableStart find_table(const std::vector<std::string>& lines);
 

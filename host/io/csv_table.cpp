@@ -23,8 +23,8 @@ namespace {
 constexpr std::size_t block_bytes = 1 << 20;
 // A row of 100,000 numbers is shorter; a file without line ends must not fill the memory.
 constexpr std::size_t longest_line = 16 << 20;
-// Lines that show where a table begins.
-constexpr std::size_t enough_lines = 200;
+// Lines that show where a table begins, unless these are long.
+constexpr std::size_t enough_lines = 1000;
 
 /// The separator that a spreadsheet's first line "sep=;" names.
 std::optional<char> separator_named(std::string_view line) {
@@ -121,11 +121,11 @@ void TextLines::append_utf16(std::string_view bytes) {
   left_.erase(0, 2 * static_cast<std::size_t>(read - units.data()));
 }
 
-CsvTable::CsvTable(std::filesystem::path path, std::uint64_t header_line)
-    : path_(std::move(path)), lines_(path_) {
-  find_start(header_line);
+CsvTable::CsvTable(std::filesystem::path path, std::optional<std::uint64_t> header_line)
+    : path_(std::move(path)), lines_(path_), may_name_header_(header_line) {
+  find_start(header_line.value_or(0));
   split();
-  has_header_ = header_line > 0 || is_header(cells_, separator_);
+  has_header_ = header_line.value_or(0) > 0 || is_header(cells_, separator_);
   name_columns();
   row_is_ready_ = !has_header_;
 }
@@ -135,12 +135,14 @@ void CsvTable::find_start(std::uint64_t header_line) {
   std::vector<std::string> lines;
   std::vector<std::uint64_t> numbers;
   std::optional<char> named;
-  while (lines.size() < enough_lines + header_line && next_line()) {
+  std::size_t bytes = 0;
+  while (lines.size() < enough_lines && bytes < longest_line && next_line()) {
     if (const auto separator = separator_named(line_); separator && lines.empty()) {
       named = named ? named : separator;
       ++skipped_lines_;
     } else if (number_ >= header_line) {
       lines.emplace_back(line_);
+      bytes += line_.size();
       numbers.push_back(number_);
     }
   }
@@ -212,12 +214,14 @@ void CsvTable::keep_where(std::size_t column, std::string value) {
   kept_.emplace_back(column, std::move(value));
 }
 
+bool CsvTable::holds(std::size_t column, std::string_view value) const {
+  const auto number = number_in(value, separator_);
+  return cells_[column] == value || (number && number_in(cells_[column], separator_) == number);
+}
+
 bool CsvTable::is_kept() const {
-  return std::ranges::all_of(kept_, [&](const auto& where) {
-    const auto& [column, value] = where;
-    const auto number = number_in(value, separator_);
-    return cells_[column] == value || (number && number_in(cells_[column], separator_) == number);
-  });
+  return std::ranges::all_of(kept_,
+                             [&](const auto& where) { return holds(where.first, where.second); });
 }
 
 /// The row's cells, without an empty one behind a last separator; false where they are more or

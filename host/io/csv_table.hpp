@@ -46,18 +46,19 @@ class TextLines {
 /// Reads a table of numbers from a text file, row by row, in constant memory.
 ///
 /// Cells are separated by tabs, semicolons, commas or blanks. The table begins at the first line
-/// that has as many cells as most of the first 200 lines; what stands before it is skipped, and
+/// that has as many cells as its rows (see find_table()); what stands before it is skipped, and
 /// `sep=;` names the separator, as spreadsheets write it. The first row is the header where it
 /// holds names and no number, or where its numbers count 0, 1, 2, ... (five at least); "inf" and
-/// "nan" are numbers. '#' at the start of a line or after a blank begins a comment. Empty lines, a
+/// "nan" are numbers. '#' at the start of a line or after a number begins a comment. Empty lines, a
 /// byte order mark, UTF-16, CRLF, quotes around a cell and a separator after the last cell of a row
 /// are accepted; so are decimal commas where commas do not separate. Every error is one line that
 /// names the file, the line and the column.
 class CsvTable {
  public:
-  /// @param header_line number of the line that holds the names, from 1; 0: it is found
+  /// @param header_line number of the line that holds the names, from 1; 0: it is found; none: so,
+  /// and there is no option `header-line`
   /// @throws Error where the file cannot be read, is not text or holds no row
-  explicit CsvTable(std::filesystem::path path, std::uint64_t header_line = 0);
+  explicit CsvTable(std::filesystem::path path, std::optional<std::uint64_t> header_line = {});
 
   const std::filesystem::path& path() const { return path_; }
   bool has_header() const { return has_header_; }
@@ -93,6 +94,8 @@ class CsvTable {
 
   /// Returns the text of a cell of the row, without the quotes around it; valid until next().
   std::string_view text(std::size_t column) const { return cells_[column]; }
+  /// True where a cell of the row is this text, or this number.
+  bool holds(std::size_t column, std::string_view value) const;
   std::uint64_t line_number() const { return number_; }  ///< of the row, from 1
 
   /// Throws Error that names the row's line and the message, formatted as by fmt::format().
@@ -105,9 +108,10 @@ class CsvTable {
   template <typename... Parts>
   [[noreturn]] void refuse_columns(fmt::format_string<const Parts&...> message,
                                    const Parts&... parts) const {
-    palpate::refuse(fmt::format("{}:{}", path_.string(), header_number_), "{}; the {} there is {}",
-                    fmt::format(message, parts...), has_header_ ? "header" : "first row",
-                    header_words());
+    palpate::refuse(fmt::format("{}:{}", path_.string(), header_number_),
+                    "{}; the {} there is {}{}", fmt::format(message, parts...),
+                    has_header_ ? "header" : "first row", header_words(),
+                    may_name_header_ ? " (or give `header-line`)" : "");
   }
 
   /// The file's lines, at least as many as its rows: for reserving memory.
@@ -125,6 +129,7 @@ class CsvTable {
 
   std::filesystem::path path_;
   TextLines lines_;
+  bool may_name_header_ = false;
   std::string_view line_;     ///< without its comment
   std::uint64_t number_ = 0;  ///< of the line
   std::uint64_t skipped_lines_ = 0;

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double before_all = -std::numeric_limits<double>::infinity();
+constexpr Unit pressure_units[] = {{"kPa"}};
 
 /// Returns a whole number, at least 0, in a cell of the row.
 std::uint64_t count_in(const CsvTable& table, std::size_t column, std::uint64_t limit,
@@ -88,12 +89,18 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
   all.holds_poses = !pose.empty();
   all.pressure.reserve(table.count_lines() * elements);
   TableTimes times(table, time.value_or(UnitColumn()));
+  std::size_t repeated = 0;
   while (table.next()) {
+    if (time) {
+      const double time_s = times.next(all.time_s.size());
+      if (!options.keeps_repeated && !all.time_s.empty() && time_s == all.time_s.back()) {
+        ++repeated;
+        continue;
+      }
+      all.time_s.push_back(time_s);
+    }
     for (const std::vector<std::size_t>& axes : readings) {
       all.pressure.push_back(reading_in(table, axes, is_norm));
-    }
-    if (time) {
-      all.time_s.push_back(times.next(all.time_s.size()));
     }
     if (device_time) {
       all.device_time_s.push_back(table.number(*device_time).value_or(unknown_number));
@@ -103,12 +110,21 @@ PressureTable read_wide(CsvTable& table, std::size_t elements, const TableOption
           count_in(table, *lost_before, largest_count, "is no count of lost frames"));
     }
   }
+  if (repeated > 0) {
+    all.understood.push_back(fmt::format(
+        "{} of its rows repeat the time of the row before, whose readings are kept", repeated));
+  }
   all.steps = std::move(times.steps);
   return all;
 }
 
 /// Reads frames that are blocks of so many rows.
-PressureTable read_blocks(CsvTable& table, std::size_t rows) {
+PressureTable read_blocks(CsvTable& table, const TableOptions& options) {
+  if (!options.pressure_columns.empty() || !options.where.empty()) {
+    table.refuse_columns("its frames are blocks of rows, which are read whole; leave out `{}`",
+                         options.where.empty() ? "pressure-columns" : "where");
+  }
+  const std::size_t rows = (*options.grid)[1];
   PressureTable all;
   bool passed = false;
   std::size_t row = 0;
@@ -146,16 +162,24 @@ double frame_in(const CsvTable& table, std::size_t column, double last) {
 /// pressures.
 std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
                                        const TableOptions& options) {
-  const auto find = [&](std::string_view names) {
-    return find_column(table, names, no_unit, options);
-  };
-  const auto element_column = find("element taxel");
-  const auto pressure_column = find("pressure pressure_kpa value");
-  const auto frame_column = find("frame touch");
-  const auto time = find_time(table, options);
+  const auto element_column = find_column(table, "element taxel", no_unit, options);
+  auto pressure_column = find_column(table, "pressure value", pressure_units, options);
+  if (element_column && !options.pressure_columns.empty()) {
+    const auto chosen = choose_columns(table, options.pressure_columns, {element_column->index},
+                                       "pressure-columns");
+    pressure_column =
+        chosen.size() == 1 ? std::optional(UnitColumn{.index = chosen.front()}) : std::nullopt;
+  }
   if (!element_column || !pressure_column) {
     return {};
   }
+  if (!options.pressure_component.empty()) {
+    table.refuse_columns("`pressure-component {}`: each row holds one reading; leave it out",
+                         options.pressure_component);
+  }
+  const auto time = find_time(table, options);
+  // A touch may last for many frames.
+  const auto frame_column = find_column(table, time ? "frame" : "frame touch", no_unit, options);
   if (!time && !frame_column) {
     table.refuse_columns(
         "a table with a row for each reading needs a column 'time' or 'frame'; add it, "
@@ -173,20 +197,20 @@ std::optional<PressureTable> read_long(CsvTable& table, std::size_t elements,
   std::vector<bool> read(elements);
   TableTimes times(table, time.value_or(UnitColumn()));
   while (table.next()) {
-    const double key =
-        time ? times.next(all.time_s.size()) : frame_in(table, frame_column->index, last);
+    const double key = frame_column ? frame_in(table, frame_column->index, time ? before_all : last)
+                                    : times.next(all.time_s.size());
     if (key != last) {
       all.pressure.insert(all.pressure.end(), elements, unknown_number);
       read.assign(elements, false);
       if (time) {
-        all.time_s.push_back(key);
+        all.time_s.push_back(frame_column ? times.next(all.time_s.size()) : key);
       }
       last = key;
     }
     const auto element = count_in(table, element_column->index, elements - 1, remedy.c_str());
     if (read[element]) {
       table.refuse("element {} has two readings {}; leave one out", element,
-                   time ? "at one time" : "in one frame");
+                   frame_column ? "in one frame" : "at one time");
     }
     read[element] = true;
     all.pressure[all.pressure.size() - elements + element] =
@@ -223,11 +247,10 @@ double coordinate(const CsvTable& table, const UnitColumn& column) {
 PressureTable read_pressures(const std::filesystem::path& path, std::size_t elements,
                              const TableOptions& options) {
   CsvTable table = open_table(path, options);
-  std::optional<PressureTable> pressures;
-  if (options.has_blocks && is_of_blocks(table, options)) {
-    pressures = read_blocks(table, (*options.grid)[1]);
+  std::optional<PressureTable> pressures = read_long(table, elements, options);
+  if (!pressures && options.has_blocks && is_of_blocks(table, options)) {
+    pressures = read_blocks(table, options);
   }
-  pressures = pressures ? std::move(pressures) : read_long(table, elements, options);
   pressures = pressures ? std::move(pressures) : read_wide(table, elements, options);
   if (table.skipped_lines() > 0) {
     pressures->understood.insert(pressures->understood.begin(),

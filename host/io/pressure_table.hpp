@@ -27,10 +27,12 @@ struct PressureTable {
 /// where each element reads three axes and `options` says what of them is the pressure. The columns
 /// are those that `options` names, or, in a table with a header, all columns that have a name and
 /// hold neither times, nor poses, nor `device_time`, nor `lost_before`. A table without a header
-/// holds the pressures, and before them the times where it has one column more than elements.
+/// holds the pressures, and before them the times where it has one column more than elements. Of
+/// rows of one time the first is kept, unless `options` says otherwise.
 ///
 /// Long: a row for each reading, in a table with the columns `element` (or taxel, counted from 0)
-/// and `pressure` (or value), and `time` or `frame`, which is the same in all readings of a frame.
+/// and `pressure` (or value, or the one that `options` names), and `time` or `frame`, which is the
+/// same in all readings of a frame: the frame where a table has both.
 ///
 /// Blocks: where `options` says so, each frame is a block of rows as the array has them, and other
 /// lines, such as "Frame 12", stand between the blocks.

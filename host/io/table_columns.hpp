@@ -34,8 +34,8 @@ inline constexpr std::array<Unit, 2> angle_units{{{"rad"}, {"deg", std::numbers:
 
 /// What the options say about the columns, rows and units of tables; "" where one is not given.
 struct TableOptions {
-  /// Of the table (of an import: of the pressures), from 1; 0: found.
-  std::uint64_t header_line = 0;
+  /// Of the table (of an import: of the pressures), from 1; 0: found; none: no option gives it.
+  std::optional<std::uint64_t> header_line = 0;
   /// COLUMN=VALUE: of a table with this column, only rows with this value.
   std::vector<std::string> where;
   std::string time_column;       ///< "": the usual names
@@ -58,6 +58,8 @@ struct TableOptions {
   std::optional<std::array<std::size_t, 2>> grid = {};
   /// Set by import_tables(): each frame may be a block of rows, as the array has them.
   bool has_blocks = false;
+  /// Set by import_tables(): rows of one time are all kept.
+  bool keeps_repeated = false;
 };
 
 /// @throws Error naming the option whose value makes no sense
@@ -152,6 +154,9 @@ struct ClockStep {
   double to_s = 0.0;
 };
 
+/// The year 5138: no time in s is later; one in ms is.
+inline constexpr double latest_time_s = 1e11;
+
 /// Reads the times of a table's rows, in numbers or as clocks write them.
 class TableTimes {
  public:
@@ -160,8 +165,7 @@ class TableTimes {
   /// Returns the row's time in seconds, and notes where it is earlier than that of the row before.
   /// Times of day go on after midnight.
   /// @param row of those that are read
-  /// @throws Error where the cell holds no time, or more than ten rows are earlier than the row
-  /// before
+  /// @throws Error where the cell holds no time
   double next(std::size_t row);
 
   std::vector<ClockStep> steps;

@@ -11,11 +11,7 @@ namespace palpate {
 
 namespace {
 
-// The year 5138; a time in ms is larger.
-constexpr double latest_s = 1e11;
 constexpr double day_s = 86400.0;
-// Rows that are not sorted step back more often than a clock is set.
-constexpr std::size_t most_steps = 10;
 
 /// Takes numbers of this form, 0 for each digit, from the front of the text; none where it begins
 /// otherwise.
@@ -120,7 +116,7 @@ double TableTimes::next(std::size_t row) {
   if (text.find(':') == text.npos) {
     const double number = table_.require_number(column_.index);
     time_s = column_.unit.convert(number);
-    if (std::abs(time_s) > latest_s) {
+    if (std::abs(time_s) > latest_time_s) {
       table_.refuse("column '{}': {} {} is no time; give the unit by `time-unit` ms, us or ns",
                     printable(table_.columns()[column_.index]), number, column_.unit.name);
     }
@@ -134,20 +130,14 @@ double TableTimes::next(std::size_t row) {
           printable(table_.columns()[column_.index]), printable(text));
     }
     time_s = *clock_s + (of_day ? days_s_ : 0.0);
-    if (of_day && !first_ && time_s < last_s_ - day_s / 2.0) {
-      days_s_ += day_s;
-      time_s += day_s;
+    const double days_s = day_s * std::round((last_s_ - time_s) / day_s);
+    if (of_day && !first_ && (days_s > 0.0 || days_s_ > 0.0)) {
+      days_s_ += days_s;  // over midnight, or a step back over it
+      time_s += days_s;
     }
   }
   if (!first_ && time_s < last_s_) {
     steps.push_back({row, table_.line_number(), last_s_, time_s});
-    if (steps.size() > most_steps) {
-      const ClockStep& step = steps.front();
-      refuse(fmt::format("{}:{}", table_.path().string(), step.line),
-             "column '{}': {} s is earlier than the row before, at {} s, and so are more than {} "
-             "rows; sort the rows by time",
-             printable(table_.columns()[column_.index]), step.to_s, step.from_s, most_steps);
-    }
   }
   first_ = false;
   last_s_ = time_s;

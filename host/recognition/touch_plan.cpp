@@ -104,7 +104,7 @@ std::vector<Pose> read_candidates(const std::filesystem::path& path,
     require_rows_of_touches(recording);
     return std::move(recording.T_robot_sensor);
   }
-  const PoseTable table = read_poses(path, {.may_name_poses = false}, false);
+  const PoseTable table = read_poses(path, {.header_line = {}, .may_name_poses = false}, false);
   if (!table.spatial.empty()) {
     refuse(path, "has poses in space; give x, y and theta in the plane of the touches");
   }

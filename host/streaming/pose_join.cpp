@@ -1,6 +1,7 @@
 #include "streaming/import_steps.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <numeric>
 #include <span>
@@ -17,6 +18,8 @@
 namespace palpate {
 
 namespace {
+
+constexpr double day_s = 86400.0;
 
 /// Drops the poses that are unknown.
 void keep_known(PoseTable& poses) {
@@ -117,16 +120,6 @@ struct TableClock {
   }
 };
 
-void require_as_many(const TableClock& clock, const TableClock& other) {
-  if (clock.steps.size() > other.steps.size()) {
-    const ClockStep& step = clock.steps.front();
-    refuse(fmt::format("{}:{}", clock.path, step.line),
-           "{} s is earlier than the row before, at {} s, and the clock of {} does not step back "
-           "with it; sort the rows by time",
-           step.to_s, step.from_s, other.path);
-  }
-}
-
 }  // namespace
 
 bool in_one_file(const ImportOptions& options) {
@@ -145,12 +138,16 @@ void join(PoseTable poses, const ImportSurvey& survey, const ImportOptions& opti
     join_by_time(poses, imported);
     if (std::ranges::none_of(recording.T_robot_sensor, is_finite)) {
       const auto clock = std::ranges::find(recording.findings, "clock", &SetupFinding::what);
+      const double days = std::round((poses.time_s.front() - recording.time_s.front()) / day_s);
       refuse(options.poses,
              "no row of {} finds a pose: its times are {} to {} s, the poses' are {} to {} s; {}",
              options.pressures, recording.time_s.front(), recording.time_s.back(),
              poses.time_s.front(), poses.time_s.back(),
-             clock == recording.findings.end() ? "check clocks and units, or raise `largest-gap-s`"
-                                               : clock->words);
+             clock != recording.findings.end() ? clock->words
+             : std::abs(days) == 1.0
+                 ? fmt::format("where midnight lies between them, give `pose-delay {:.0f}`",
+                               options.pose_delay_s + days * day_s)
+                 : "check clocks and units, or raise `largest-gap-s`");
     }
     return;
   }
@@ -170,10 +167,23 @@ std::vector<std::string> lay_out_stretches(const ImportOptions& options, Pressur
   std::vector<TableClock> clocks{{options.pressures, pressures.time_s, pressures.steps}};
   if (poses && !poses->time_s.empty()) {
     clocks.push_back({options.poses, poses->time_s, poses->steps});
-    require_as_many(clocks[0], clocks[1]);
-    require_as_many(clocks[1], clocks[0]);
   }
-  std::vector<std::string> words;
+  // Rows that are not sorted step back more often than a clock is set.
+  constexpr std::size_t most_steps = 10;
+  for (const TableClock& clock : clocks) {
+    for (const TableClock& other : clocks) {
+      if (clock.steps.size() > std::min(most_steps, other.steps.size())) {
+        const ClockStep& step = clock.steps.front();
+        refuse(fmt::format("{}:{}", clock.path, step.line),
+               "{} s is earlier than the row before, at {} s, and {}; sort the rows by time",
+               step.to_s, step.from_s,
+               clock.steps.size() > most_steps
+                   ? fmt::format("so are more than {} rows", most_steps)
+                   : fmt::format("the clock of {} does not step back with it", other.path));
+      }
+    }
+  }
+  std::string lines;
   for (std::size_t k = 1; k <= pressures.steps.size(); ++k) {
     double end_s = clocks[0].stretch(k - 1).back();
     double begin_s = clocks[0].stretch(k).front();
@@ -186,13 +196,20 @@ std::vector<std::string> lay_out_stretches(const ImportOptions& options, Pressur
         time_s += end_s + between_s - begin_s;
       }
     }
-    const ClockStep& step = pressures.steps[k - 1];
-    words.push_back(fmt::format(
-        "{}:{}: the clock steps back from {} to {} s; a new stretch begins there, {} s after the "
-        "last",
-        options.pressures, step.line, step.from_s, step.to_s, between_s));
+    lines += fmt::format("{}{}", k == 1 ? "" : ", ", pressures.steps[k - 1].line);
   }
-  return words;
+  if (pressures.steps.empty()) {
+    return {};
+  }
+  const ClockStep& step = pressures.steps.front();
+  return {fmt::format(
+      "{}:{}: the clock steps back from {} to {} s{}; a new stretch begins there, {} s after the "
+      "last",
+      options.pressures, step.line, step.from_s, step.to_s,
+      pressures.steps.size() == 1
+          ? ""
+          : fmt::format(", as at lines {} ({} times)", lines, pressures.steps.size()),
+      between_s)};
 }
 
 }  // namespace palpate

@@ -36,11 +36,6 @@ void require_touch_poses(const ImportOptions& options, const ImportedRecording& 
   }
 }
 
-/// True where a table of this name is given and has the column.
-bool has_column(const std::string& path, const std::string& name) {
-  return !path.empty() && CsvTable(path).find_or_count(name);
-}
-
 /// @param n rows
 void choose_rows(const ImportOptions& options, std::size_t n, Recording& recording) {
   if (options.rate_hz) {
@@ -226,9 +221,12 @@ ImportedRecording import_tables(const ImportOptions& options) {
   validate(options);
   check_numbers(options);
   Recording array = import_array(options);
+  const bool one_file = in_one_file(options);
   const auto require_column = [&](const std::string& option, const std::string& name) {
-    if (!has_column(options.pressures, name) && !has_column(options.poses, name)) {
-      refuse(fmt::format("`{}`", option), "no table has this column; give its name");
+    const CsvTable pressures(options.pressures, options.header_line);
+    if (!pressures.find_or_count(name) &&
+        (one_file || options.poses.empty() || !CsvTable(options.poses).find_or_count(name))) {
+      pressures.refuse_columns("`{}`: no table has this column; give its name", option);
     }
   };
   if (!options.time_column.empty()) {
@@ -238,15 +236,15 @@ ImportedRecording import_tables(const ImportOptions& options) {
     require_column(fmt::format("where {}={}", name, value), name);
   }
   // The poses may have a table of their own, with other columns and another header.
-  const bool one_file = in_one_file(options);
   TableOptions of_pressures = options;
   of_pressures.grid = grid_size(options);
   of_pressures.has_blocks = options.rows == "frames";
   of_pressures.is_one_of_two = !one_file && !options.poses.empty();
   TableOptions of_poses = of_pressures;
+  of_pressures.keeps_repeated = one_file || options.rows == "touches";
   if (!one_file) {
     of_pressures.pose_columns = of_pressures.pose_unit = "";
-    of_poses.header_line = 0;
+    of_poses.header_line = std::nullopt;
     std::erase_if(of_poses.where, [](const std::string& where) {  // by number, of PRESSURES
       return whole_number_of(where.substr(0, where.find('='))).has_value();
     });
@@ -262,7 +260,8 @@ ImportedRecording import_tables(const ImportOptions& options) {
     of_poses.needs_times = !one_file && !rows.pressures.time_s.empty();
     rows.poses = read_poses(options.poses, of_poses, !one_file || rows.pressures.is_long);
     if (one_file && options.pose_delay_s != 0.0 &&
-        rows.pressures.time_s.size() == rows.poses->T_robot_sensor.size()) {
+        rows.pressures.time_s.size() ==
+            rows.poses->T_robot_sensor.size() + rows.poses->spatial.size()) {
       rows.poses->time_s = rows.pressures.time_s;
       rows.poses->steps = rows.pressures.steps;
     }

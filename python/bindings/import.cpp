@@ -17,6 +17,7 @@
 #include "call.hpp"
 #include "io/recording_rules.hpp"
 #include "model/option_words.hpp"
+#include "streaming/import_steps.hpp"
 #include "streaming/table_import.hpp"
 #include "touches.hpp"
 
@@ -69,12 +70,49 @@ Imported import_tables_python(const ImportOptions& options) {
   return returned(run([&] { return import_tables(options); }), options);
 }
 
-std::optional<SpatialPose> spatial_pose(std::span<const double> row) {
-  if (std::ranges::any_of(row, [](double number) { return !std::isfinite(number); })) {
+/// None where a number is NaN, or the quaternion is of zeros, as in a table.
+std::optional<SpatialPose> spatial_pose(std::span<const double> row, const std::string& place) {
+  const glm::dquat rotation(row[6], row[3], row[4], row[5]);
+  const double length = glm::length(rotation);
+  if (length == 0.0 ||
+      std::ranges::any_of(row, [](double number) { return !std::isfinite(number); })) {
     return {};
   }
-  return SpatialPose{{row[0], row[1], row[2]},
-                     glm::normalize(glm::dquat(row[6], row[3], row[4], row[5]))};
+  if (std::abs(length - 1.0) > 1e-2) {
+    refuse(place, "the quaternion's length is {:.4g}, so that it is no rotation; give x, y, z, w",
+           length);
+  }
+  return SpatialPose{{row[0], row[1], row[2]}, rotation / length};
+}
+
+/// Readings [n, e], or of a grid [n, rows, columns]; of one that is read column by column [n,
+/// columns, rows].
+Floats readings_of(ArrayReader& reader, const ArrayLike& given, const ImportOptions& options) {
+  if (nb::cast<int>(call("numpy", "ndim", given)) != 3) {
+    return reader.known(given, "pressures", {"n", "e"});
+  }
+  const auto grid = run([&] { return grid_size(options); });
+  const std::string columns = grid ? std::to_string((*grid)[0]) : "columns";
+  const std::string rows = grid ? std::to_string((*grid)[1]) : "rows";
+  const auto& [outer, inner] =
+      options.order == "columns" ? std::tie(columns, rows) : std::tie(rows, columns);
+  Floats readings = reader.known(given, "pressures", {"n", outer.c_str(), inner.c_str()});
+  readings.shape = {readings.shape[0], readings.shape[1] * readings.shape[2]};
+  return readings;
+}
+
+/// Refuses what is no time in s, and notes where the times step back, as of a table.
+std::vector<ClockStep> steps_in(const std::vector<double>& time_s, const char* name) {
+  std::vector<ClockStep> steps;
+  for (std::size_t i = 0; i < time_s.size(); ++i) {
+    if (!(std::abs(time_s[i]) <= latest_time_s)) {
+      refuse(fmt::format("{}[{}]", name, i), "{} is no time; give seconds", time_s[i]);
+    }
+    if (i > 0 && time_s[i] < time_s[i - 1]) {
+      steps.push_back({i, i, time_s[i - 1], time_s[i]});
+    }
+  }
+  return steps;
 }
 
 std::optional<std::array<double, 7>> row_of_matrix(const std::vector<double>& numbers) {
@@ -94,24 +132,36 @@ Imported import_frames(const ImportOptions& options, const ArrayLike& pressures,
                        const std::optional<ArrayLike>& object_pose) {
   ArrayReader reader;
   ImportRows rows;
-  const Floats readings = reader.floats(pressures, "pressures", {"n", "e"});
+  const Floats readings = readings_of(reader, pressures, options);
   rows.elements = readings.shape[1];
   rows.pressures.pressure = readings.copied();
   if (time_s) {
     rows.pressures.time_s = reader.floats(*time_s, "time_s", {"n"}).copied();
+    rows.pressures.steps = steps_in(rows.pressures.time_s, "time_s");
   }
   if (poses) {
     rows.poses.emplace();
-    rows.poses->time_s = reader.floats(pose_time_s, "pose_time_s", {"t"}).copied();
+    std::vector<double>& kept_s = rows.poses->time_s;
     const Floats all = reader.floats(*poses, "poses", {"m", "7"});
-    rows.poses->spatial.reserve(all.shape[0]);
+    const bool timed = nb::cast<int>(call("numpy", "size", pose_time_s)) > 0;
+    const Floats times = timed ? reader.floats(pose_time_s, "pose_time_s", {"m"}) : Floats();
     for (std::size_t i = 0; i < all.shape[0]; ++i) {
-      rows.poses->spatial.push_back(spatial_pose(all.values().subspan(7 * i, 7)));
+      if (timed && !kept_s.empty() && times.values()[i] == kept_s.back()) {
+        continue;
+      }
+      kept_s.insert(kept_s.end(), timed ? 1 : 0, timed ? times.values()[i] : 0.0);
+      rows.poses->spatial.push_back(
+          spatial_pose(all.values().subspan(7 * i, 7), fmt::format("{}[{}]", options.poses, i)));
     }
+    if (const std::size_t repeated = all.shape[0] - rows.poses->spatial.size(); repeated > 0) {
+      rows.poses->understood.push_back(fmt::format(
+          "{} of its rows repeat the time of the row before, whose pose is kept", repeated));
+    }
+    rows.poses->steps = steps_in(kept_s, "pose_time_s");
   }
   if (object_pose) {
     const Floats row = reader.floats(*object_pose, "object_pose", {"7"});
-    rows.T_robot_object = spatial_pose(row.values());
+    rows.T_robot_object = spatial_pose(row.values(), "object_pose");
   }
   return returned(run([&] { return import_rows(options, std::move(rows)); }), options);
 }

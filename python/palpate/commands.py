@@ -266,10 +266,9 @@ def import_tables(
 ) -> Recording:
     """Makes a recording from tables, as `palpate import` does; docs/files.md describes them.
 
-    pressures: a CSV file, or readings [n, e] or [n, rows, columns] with their times time_s [n] in s, where
-    NaN is unknown; array: (columns,
-    rows, pitch_mm), a CSV file, or the elements' centres [e, 2] in mm in the sensor frame, in the order
-    of their readings; first_element and order: where the first element of a grid lies, seen with x to
+    pressures: a CSV file, or readings [n, e] or [n, rows, columns] (order="columns": [n, columns, rows]) with
+    their times time_s [n] in s, where NaN is unknown; array: (columns, rows, pitch_mm), a CSV file, or the
+    elements' centres [e, 2] in mm in the sensor frame, in the order of their readings; first_element and order: where the first element of a grid lies, seen with x to
     the right and y upwards, and which follow it; dead: elements that do not read, from 0; sign: -1
     where readings fall under load, which are taken times -1; poses: a CSV
     file of T_robot_sensor, in mm and rad where neither its columns' names nor pose_unit say otherwise, or,
@@ -294,13 +293,16 @@ def import_tables(
     elif isinstance(poses, (str, bytes, os.PathLike)):
         raise Error(f"poses: {os.fsdecode(poses)!r} is a file beside an array of pressures; give an array")
     else:
+        for name in ("pose_unit", "time_unit", "time_column", "header_line", "where", "pressure_columns",
+                     "pressure_component", "pose_columns", "euler", "matrix"):  # fmt: skip
+            if options[name] not in (None, []):
+                raise Error(f"{name}: is for tables; leave it out beside arrays, whose units are fixed")
+        if pose_time_s is not None and poses is None:
+            raise Error("pose_time_s: is of poses; give poses")
         options |= {"pressures": "pressures", "poses": None if poses is None else "poses"}
-        import numpy
-
-        readings = numpy.asarray(pressures, numpy.float64)
         recording, sentences = _palpate.import_frames(
             import_request(import_tables, options),
-            readings.reshape(len(readings), -1) if readings.ndim == 3 else readings,
+            pressures,
             time_s,
             () if pose_time_s is None else pose_time_s,
             None if poses is None else _in_space(poses),

@@ -97,5 +97,11 @@ def test_what_neither_a_table_nor_arrays_can_have_is_refused(plain: pathlib.Path
         (plain, {**square, "pose_time_s": [0, 1, 2]}, "time_s and pose_time_s: are for arrays"),
         (READINGS, {**square, "poses": plain}, f"poses: '{plain}' is a file beside an array"),
         (READINGS, {**square, "time_s": [0, 1]}, "time_s"),
+        (READINGS, {**square, "time_s": [0, 1, numpy.nan]}, "time_s[2]: nan is no time"),
+        (READINGS, {**square, "pose_unit": ("m", "deg")}, "pose_unit: is for tables"),
+        (READINGS, {**square, "poses": numpy.zeros((3, 3)), "pose_time_s": range(9)},
+         "pose_time_s: shape (9,); give (m,) with m = 3 of poses"),
+        (READINGS, {**square, "poses": [[0, 0, 0, 0, 0, 0, 3]] * 3}, "poses[0]: the quaternion's length is 3"),
+        (numpy.zeros((1, 3, 2)), {"array": (3, 2, 1)}, "pressures: shape (1, 3, 2); give (n, 2, 3)"),
     ):
         assert error_of(palpate.import_tables, pressures, **options).startswith(words)

@@ -123,14 +123,28 @@ READ = {
     "poses_beside_single_readings": Case(
         "time,element,pressure,x,y,theta\n0,0,1,10,20,0\n0,1,2,10,20,0\n.1,0,3,2,20,0\n.1,1,4,2,20,0\n",
         ["--poses", "log.csv"], READINGS, poses=[[10, 20, 0], [2, 20, 0]]),
+    "an_order_that_is_given": Case("time,p1,p0\n0,2,1\n.1,4,3\n", ["--pressure-columns", "p1,p0"],
+        [row[::-1] for row in READINGS]),
+    "one_of_two_columns_of_readings": Case("time,element,pressure,raw\n0,0,9,1\n0,1,9,2\n.1,0,9,3\n.1,1,9,4\n",
+        ["--pressure-columns", "raw"], READINGS),
+    "a_time_for_each_reading": Case("frame,t,Element,Pressure [kPa]\n0,0,0,1\n0,0.01,1,2\n1,0.1,0,3\n1,0.11,1,4\n",
+        [], READINGS, times=[0, 0.1]),
+    "names_and_labels_with_a_number_sign": Case(
+        "time,Taxel #0,Taxel #1,label\n0,1,2,mug #2\n.05,9,9,mug #1\n.1,3,4,mug #2\n",
+        ["--where", "label=mug #2"], READINGS),
     # Sheets.
     "lines_before_the_header": Case("Tactile array 5\nRecorded 2026-11-01, by hand\n\ntime,p0,p1\n0,1,2\n.1,3,4\n",
         [], READINGS, said=["log.csv: 2 lines before line 4 ('time', 'p0', 'p1') are left out (--header-line)"]),
     "lines_filled_up_by_a_spreadsheet": Case("Device,5,,\nOperator,A,,\ntime,p0,p1,\n0,1,2,\n.1,3,4,\n", [], READINGS,
         said=["2 lines before line 3"]),
-    "a_header_line_that_is_given": Case("a,b,c\ntime,p0,p1\n0,1,2\n.1,3,4\n", ["--header-line", "2"], READINGS,
-        times=[0, 0.1]),
+    "a_header_line_that_is_given": Case("a,a,c\nwhen,p0,p1\n0,1,2\n.1,3,4\n",
+        ["--header-line", "2", "--time-column", "when"], READINGS, times=[0, 0.1]),
+    "a_short_table_below_more_lines": Case("K;0\nK;1\nK;2\nK;3\ntime;p0;p1\n0;1;2\n0,1;3;4\n", [], READINGS,
+        said=["4 lines before line 5 ('time', 'p0', 'p1')"]),
+    "numbers_before_the_header": Case("2,1\ntime,p0,p1\n0,1,2\n.1,3,4\n", [], READINGS, times=[0, 0.1]),
+    "an_empty_row_before_the_header": Case(";;\ntime;p0;p1\n0;1;2\n0,1;3;4\n", [], READINGS, times=[0, 0.1]),
     "sep_and_decimal_commas": Case("sep=;\r\ntime;p0;p1\r\n0;1,0;2\r\n0,1;3;4\r\n", [], READINGS, times=[0, 0.1]),
+    "decimal_commas_between_blanks": Case("time p0 p1\n0,0 1,0 2\n0,1 3 4 # last\n", [], READINGS, times=[0, 0.1]),
     "utf_16": Case("time\tp0\tp1\r\n0\t1\t2\r\n0,1\t3\t4\r\n".encode("utf-16"), [], READINGS, times=[0, 0.1]),
     "utf_16_big_endian": Case(b"\xfe\xff" + "time,p0 \U0001f446 \ud83d,p1\n0,1,2\n.1,3,4\n".encode("utf-16-be",
         "surrogatepass"), [], READINGS, times=[0, 0.1]),
@@ -154,6 +168,13 @@ READ = {
     "a_unit_of_the_other_times": Case({"log.csv": "time,p0,p1\n0,1,2\n100,3,4\n",
         "poses.csv": "time_s,x,y,theta\n0,10,20,0\n.1,10,20,0\n"}, [*WITH_POSES, "--time-unit", "ms"], READINGS,
         times=[0, 0.1], poses=[[10, 20, 0]] * 2),
+    "readings_at_one_time": Case("time,p0,p1\n0,1,2\n0,9,9\n.1,3,4\n", [], READINGS,
+        said=["1 of its rows repeat the time of the row before, whose readings are kept"]),
+    "a_step_back_over_midnight": Case(
+        "time,p0,p1\n23:59:59.5,1,2\n00:00:00,3,4\n23:59:59.75,1,2\n23:59:59.5,3,4\n", [], READINGS * 2,
+        times=[86399.5, 86400, 86410, 86420], said=["back from 86400 to 86399.75 s, as at lines 4, 5 (2 times)"]),
+    "a_delay_in_one_file": Case("time,p0,p1,x,y,z,roll,pitch,yaw\n0,1,2,0,20,5,0,0,0\n.1,3,4,10,20,5,0,0,0\n",
+        ["--poses", "log.csv", "--pose-delay", "-.05", "--pose-unit", "mm,rad"], poses=[[NAN] * 3, [5, 20, 0]]),
     "a_clock_that_steps_back": Case({"log.csv": "time,p0,p1\n5,1,2\n6,3,4\n0.5,1,2\n1.5,3,4\n",
         "poses.csv": "time,x,y,theta\n5,1,1,0\n6,1,1,0\n0,2,2,0\n2,2,2,0\n"}, [*WITH_POSES, "--largest-gap-s", "3"],
         READINGS * 2, times=[5, 6, 16.5, 17.5], poses=[[1, 1, 0]] * 2 + [[2, 2, 0]] * 2,
@@ -181,6 +202,17 @@ REFUSED: dict[str, tuple["Files | str | bytes", list[str], str]] = {
     "more_columns": ("time,p0,p1,p2\n0,1,2,3\n", [],
         "log.csv:1: 3 columns of pressure ('p0' to 'p2') for an array of 2 elements"),
     "sorted_as_text": ("time,p10,p2\n0,1,2\n", [], "log.csv:1: column 'p2' comes after 'p10'"),
+    "sorted_as_text_with_an_end": ("time,p10_z,p2_z\n0,1,2\n", [], "log.csv:1: column 'p2_z' comes after 'p10_z'"),
+    "rows_sorted_as_text": ("time,r10_c1,r2_c0\n0,1,2\n", [], "log.csv:1: column 'r2_c0' comes after 'r10_c1'"),
+    "axes_sorted_as_text": ("time,x10,x2,y10,y2,z10,z2\n0,1,2,3,4,5,6\n", ["--pressure-component", "z"],
+        "log.csv:1: column 'z2' comes after 'z10'"),
+    "an_axis_of_one_reading": ("time,element,pressure\n0,0,1\n", ["--pressure-component", "z"],
+        "log.csv:1: --pressure-component z: each row holds one reading; leave it out"),
+    "columns_of_blocks": ("1,2\n3,4\n", ["--rows", "frames", "--rate", "1", "--array", "2:2:2", "--where", "1=1"],
+        "log.csv:1: its frames are blocks of rows, which are read whole; leave out --where"),
+    "a_fault_of_a_spreadsheet": ("time\tp0\tp1\n0\t1\t#DIV/0!\n", [], "log.csv:2: column 'p1': '#DIV/0!' is not"),
+    "poses_of_the_next_day": ({"poses.csv": "time,x,y,theta\n86400,1,2,3\n"}, WITH_POSES,
+        "where midnight lies between them, give --pose-delay 86400"),
     "of_one_number": ("time,p1,p01\n0,1,2\n", [], "log.csv:1: column 'p01' comes after 'p1'"),
     "no_pose_known": ({"poses.csv": "time,x_mm,y_mm,theta_rad\n0,,,\n0.1,,,\n"}, WITH_POSES,
         "poses.csv: holds no pose"),
@@ -257,7 +289,7 @@ REFUSED: dict[str, tuple["Files | str | bytes", list[str], str]] = {
         [*WITH_POSES, "--largest-gap-s", "0.03"],
         "poses.csv: no row of log.csv finds a pose: its times are 0 to 0.1 s, the poses' are 0.01 to 0.08 s; check "
         "clocks and units, or raise --largest-gap-s"),
-    "no_such_column_to_keep": ({}, ["--where", "id=2"], "--where id=2: no table has this column; give its name"),
+    "no_such_column_to_keep": ({}, ["--where", "id=2"], "--where id=2: no table has this column"),
     "no_such_header_line": ({}, ["--header-line", "9"], "--header-line 9: log.csv has no such line"),
     "three_axes_unsaid": ("time,x0,y0,z0,x1,y1,z1\n0,8,9,1,8,9,2\n", [],
         "log.csv:1: 6 columns of pressure ('x0' to 'z1') for an array of 2 elements; where each element reads x, y "
@@ -291,7 +323,8 @@ REFUSED: dict[str, tuple["Files | str | bytes", list[str], str]] = {
     "array_without_columns": ({}, ["--array", "0:1:2"], "--array 0:1:2: give COLUMNS:ROWS:PITCH, with 1 to 1024"),
     "output_over_input": ({}, ["-o", "log.csv"], "-o log.csv: would overwrite log.csv, which PRESSURES reads"),
     "no_column_of_times": (poses("x,y,theta", "0,5,-1"), [*WITH_POSES, "--time-column", "stmap"],
-        "--time-column stmap: no table has this column"),
+        "log.csv:1: --time-column stmap: no table has this column; give its name; the header there is 'time', 'p0', "
+        "'p1' (or give --header-line)"),
     "no_column_of_times_in_touches": ("p0,p1\n1,2\n", ["--time-column", "when"],
         "--time-column when: no table has this column"),
 }  # fmt: skip
@@ -341,13 +374,15 @@ def test_a_log_that_makes_no_recording_is_refused(name: str, tmp_path: pathlib.P
 
 def test_a_column_of_labels_makes_a_recording_each_or_none(tmp_path: pathlib.Path) -> None:
     """Values of which only kept rows have some make no recording; where one is refused, none is written."""
-    log = "time,p0,p1,label,id\n0,1,2,cup,1\n.1,3,4,key,2\n.2,5,6,1,1\n.3,5,6,1.0,1\n"
-    assert imported(tmp_path, log, ["--split", "label", "--where", "id=1"]).returncode == 0
+    log = "time;p0;p1;label;id\n0;1;2;cup;1\n.1;3;4;key;2\n.2;5;6;1;1\n.3;5;6;1,0;1\n.35;7;8;;1\n"
+    done = imported(tmp_path, log, ["--split", "label", "--where", "id=1"])
+    assert "log.csv: 1 rows without a value of 'label' are left out (--split)" in done.stderr
     assert sorted(file.name for file in tmp_path.glob("*.h5")) == ["o-1.h5", "o-cup.h5"]
     one, cup = (palpate.read_recording(tmp_path / f"o-{label}.h5") for label in ("1", "cup"))
     assert (one.object, one.pressure.tolist()) == ("1", [[5, 6], [5, 6]])
     assert (cup.object, cup.pressure.tolist()) == ("cup", [[1, 2]])
-    for name, bad in (("x", log + ".4,abc,6,late,1\n"), ("y", log + ".4,1,2,a/b,1\n.5,1,2,a_b,1\n")):
+    for name, bad in (("x", log + ".4;abc;6;late;1\n"), ("y", log + ".4;1;2;a/b;1\n.5;1;2;a_b;1\n"),
+                      ("z", log + f".4;1;2;{'L' * 250};1\n")):  # fmt: skip
         done = imported(tmp_path, bad, ["--split", "label", "-o", f"{name}.h5"])
         expect_refused(done, "")
         assert not list(tmp_path.glob(f"{name}-*.h5"))
