@@ -18,7 +18,7 @@
 #include "learning/table_learning.hpp"
 #include "model/option_words.hpp"
 #include "palpate/files.hpp"
-#include "recognition/object_fit.hpp"
+#include "recognition/label_probability.hpp"
 #include "recognition/recordings.hpp"
 
 namespace palpate::cli {

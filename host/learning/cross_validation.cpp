@@ -17,7 +17,6 @@
 #include "palpate/error.hpp"
 #include "palpate/pose_error.hpp"
 #include "recognition/label_probability.hpp"
-#include "recognition/object_fit.hpp"
 
 namespace palpate {
 

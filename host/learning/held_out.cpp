@@ -15,7 +15,6 @@
 #include "learning/local_search.hpp"
 #include "palpate/error.hpp"
 #include "recognition/label_probability.hpp"
-#include "recognition/object_fit.hpp"
 
 namespace palpate {
 

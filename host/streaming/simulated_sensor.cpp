@@ -7,7 +7,6 @@
 #include "model/random.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/simulation.hpp"
-#include "streaming/pace.hpp"
 #include "streaming/pose_between.hpp"
 
 namespace palpate {

@@ -18,7 +18,6 @@
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/touch.hpp"
-#include "streaming/pace.hpp"
 #include "streaming/simulated_sensor.hpp"
 
 namespace palpate {

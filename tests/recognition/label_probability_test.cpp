@@ -12,7 +12,6 @@
 #include <optional>
 
 #include "recognition/filter_choice.hpp"
-#include "recognition/object_fit.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/scales.hpp"
 #include "shapes.hpp"
