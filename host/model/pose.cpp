@@ -93,9 +93,12 @@ RefinedPose least_turned(const std::optional<Body>& body, int symmetry,
   glm::dmat3 jacobian{1.0};  // by columns
   jacobian[0] = {rotate(turn_rad, {1.0, 0.0}), 0.0};
   jacobian[1] = {rotate(turn_rad, {0.0, 1.0}), 0.0};
-  if (body && symmetry == 0) {  // the turn follows theta, which is then known
+  if (body && symmetry == 0) {
+    // The turn follows theta, so that theta moves the body alone: of T_robot_object, whose theta
+    // keeps its variance, x and y do not depend on where the frame's origin lies.
     const glm::dvec2 arm_mm = refined.T_object_robot.translation_mm - body->centroid_mm;
-    jacobian[2] = {-rotate(turn_rad + std::numbers::pi / 2.0, arm_mm), 0.0};
+    jacobian[2] = {rotate(std::numbers::pi / 2.0, turned.translation_mm - rotate(turn_rad, arm_mm)),
+                   1.0};
   }
   return {turned, carried_over(matrix_of(refined.covariance), jacobian)};
 }

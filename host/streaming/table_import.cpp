@@ -241,7 +241,6 @@ ImportedRecording import_tables(const ImportOptions& options) {
   of_pressures.has_blocks = options.rows == "frames";
   of_pressures.is_one_of_two = !one_file && !options.poses.empty();
   TableOptions of_poses = of_pressures;
-  of_pressures.keeps_repeated = one_file || options.rows == "touches";
   if (!one_file) {
     of_pressures.pose_columns = of_pressures.pose_unit = "";
     of_poses.header_line = std::nullopt;
@@ -249,6 +248,10 @@ ImportedRecording import_tables(const ImportOptions& options) {
       return whole_number_of(where.substr(0, where.find('='))).has_value();
     });
   }
+  // Poses without times belong to the rows one by one.
+  of_pressures.keeps_repeated =
+      one_file || options.rows == "touches" ||
+      (!options.poses.empty() && !find_time(open_table(options.poses, of_poses), of_poses));
   ImportRows rows{.pressures =
                       read_pressures(options.pressures, array.elements_mm.size(), of_pressures)};
   const Unit length_unit = given_unit(options, length_units).value_or(length_units.front());

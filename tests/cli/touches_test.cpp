@@ -168,7 +168,7 @@ TEST_F(TouchesCommand, RefusesWhatHoldsNoTouches) {
   expect_refused("touches t.h5 -o u.h5", {"t.h5", "touches"});
   expect_refused("touches missing.h5 -o u.h5", {"missing.h5"});
   for (const auto& [flags, named] : {std::pair{"--onset 1000", "--onset"},
-                                     {"--onset=-1", "onset = -1"},
+                                     {"--onset=-1", "--onset -1"},
                                      {"--release 5", "release = 5"},
                                      {"--steady 2", "steady = 2"},
                                      {"--drift-s=-1", "--drift-s -1"}}) {

@@ -73,7 +73,11 @@ OccupancyGrid with_prior(Device& device, const OccupancyGrid& map, double prior)
   OccupancyGrid result = map;
   result.prior = prior;
   // How far a reading is felt depends on the prior: the other map may have a row more or less.
-  const glm::ivec2 from(glm::round((map.origin_mm - other.origin_mm) / map.cell_mm));
+  glm::ivec2 from(0);
+  if (other.nx != map.nx || other.ny != map.ny) {
+    const glm::dvec2 own_mm = built(device, map, map.prior).origin_mm;  // in the touches' frame
+    from = glm::round((own_mm - other.origin_mm) / map.cell_mm);
+  }
   auto cell = result.log_odds.begin();
   for (int y = from.y; y < from.y + map.ny; ++y) {
     for (int x = from.x; x < from.x + map.nx; ++x) {
