@@ -137,8 +137,8 @@ TEST_F(MapDrawing, TellsCalibrateWhereTheArraySitsInTheTool) {
   const Outcome outcome =
       palpate("calibrate I.h5 --maps I.map.h5 -o s.yaml --write-array array.csv");
   EXPECT_EQ(outcome.status, 0) << outcome.err;
-  expect_named(outcome.out, {"the array sits in the tool at x +",
-                             "levels of readings            2        7"});
+  expect_named(outcome.out,
+               {"the array sits in the tool at x +", "levels of readings            2        7"});
   std::ifstream array(folder_ / "array.csv");
   std::string header;
   ASSERT_TRUE(std::getline(array, header) && header == "x,y");

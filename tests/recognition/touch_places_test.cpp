@@ -51,8 +51,7 @@ TEST(TouchPlaces, CountATouchThatIsWrittenAgainOnce) {
 
 TEST(TouchPlaces, LeaveATouchItsWeightWhereOneBeforeItTellsNothing) {
   const double unknown = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(shares({touch_at({}, 36, unknown), touch_at({}, 0)}),
-            (std::vector{0.0, 35.0 / 36.0}));
+  EXPECT_EQ(shares({touch_at({}, 36, unknown), touch_at({}, 0)}), (std::vector{0.0, 35.0 / 36.0}));
 }
 
 TEST(TouchPlaces, CountFurtherTouchesByTheSquareOfTheirDistance) {
