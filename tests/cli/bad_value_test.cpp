@@ -125,8 +125,6 @@ TEST_F(BadValueOnTheCommandLine, IsNamedWithItsFlag) {
       {map, "--threshold", {"-1"}},
       {map, "--frames", {"3:3", "0:49"}},
       {recognize, "--gamma", {"1"}},
-      {recognize, "--filter", {"kalman"}},
-      {recognize, "--theta-deg", {"0:720"}},
       {recognize, "--frames", {"0:7"}},
       {recognize, "--touches", {"7"}}};
   for (const auto& [command, flag, wrong] : cases) {
@@ -209,6 +207,8 @@ TEST_F(RecognitionFlags, AreRefusedByNameAndValueWhereTheyCannotBeMeant) {
   }
   EXPECT_EQ(job({"--x-mm=2:2", "--touch-sd-mm=9", "--bins=9x9x8"}).task().touch_sd().mm, 9.0)
       << "an axis of one bin is not blurred; y is 20 mm long";
+  recording_.pressure_unit = "raw";
+  EXPECT_EQ(job({"--bins=9x9x8", "--threshold=16"}).task().classifier().threshold, 16.0);
 }
 
 TEST_F(RecognitionFlags, AreRefusedBesideASensorModelThatTakesTheirPlace) {
@@ -246,28 +246,16 @@ TEST_F(RecognitionFlags, MapsThatCannotStandTogetherAreNamed) {
   EXPECT_EQ(job({"--bins=9x9x8", "--prior=0.2"}).task().contact().prior, 0.2);
 }
 
-TEST_F(RecognitionFlags, RawPressuresNeedAThreshold) {
-  recording_.pressure_unit = "raw";
-  EXPECT_EQ(job({"--bins=9x9x8", "--threshold=16"}).task().classifier().threshold, 16.0);
-  expect_named(refusal({"--bins=9x9x8"}), {"raw", "--threshold"});
-}
-
 TEST_F(RecognitionFlags, BinsBeyondTheMachineAreRefusedWithWhatWouldHelp) {
   const std::string most = "2000000000";
   const std::string fine = "--bins=" + most + "x" + most + "x1";
   const std::string dense = "--bins=300000x300000x2";
   const std::string turning = "--bins=4x4x" + most;
   const std::string absurd = "--bins=" + most + "x" + most + "x" + most;
-  const Flags wide{"--bins=1000x1000x1000", "--x-mm=-1e9:1e9", "--y-mm=-1e9:1e9"};
   const auto by = [&](const char* filter, Flags flags) {
     flags.push_back(std::string("--filter=") + filter);
     return refusal(flags);
   };
-  expect_named(by("bounded", {fine}), {"lattice", "too many", "use fewer bins"});
-  expect_named(by("bounded", {dense}), {"lattice", "fewer bins along x and y"});
-  expect_named(by("bounded", {turning}), {"lattice", "MiB", "fewer thetas"});
-  expect_named(by("bounded", wide), {"lattice", "MiB", "narrow the region"});
-  expect_named(by("bounded", {absurd}), {"lattice", "use fewer bins"});
   expect_named(by("bounded", {"--bins=4000x4000x300", "--touch-sd-mm=0.5"}),
                {"MiB", "use fewer bins"});
   // Bounds would refuse these as well.
@@ -277,7 +265,6 @@ TEST_F(RecognitionFlags, BinsBeyondTheMachineAreRefusedWithWhatWouldHelp) {
     expect_named(said, {"bins", "use fewer"});
     EXPECT_THAT(said, Not(HasSubstr("bounded"))) << bins;
   }
-  expect_named(by("histogram", {"--bins=80000x80000x1000"}), {"80000 x 80000 x 1000 pose bins"});
   const Flags large{"--bins=4000x4000x300"};
   expect_named(by("histogram", large), {"MiB", "leave out --filter histogram: --filter bounded"});
   expect_named(refusal(large, "", "posterior"), {"MiB", "leave out --posterior: --filter bounded"});

@@ -4,7 +4,6 @@ import json
 import os
 import re
 import shutil
-import unittest
 
 from batch_folder import Batch, batch
 

@@ -3,7 +3,6 @@
 import json
 import os
 import shutil
-import unittest
 from typing import Any
 
 from batch_folder import BROKEN, RECORDINGS, Batch, batch, batch_of, name, parse

@@ -6,7 +6,6 @@ import json
 import math
 import os
 import signal
-import unittest
 from typing import Any
 
 from command import PreparedTest, Running
@@ -166,12 +165,6 @@ class Live(PreparedTest, StreamTest):
             self.assertEqual(touches[0]["best"], patient[0]["best"])
             self.assertNotEqual(touches[-1]["identity"], patient[-1]["identity"])
 
-    def test_takes_the_flags_of_recognize(self) -> None:
-        particles = ("--filter", "particles", "--particles", "500", "--slip-sd-mm", "0.5")
-        *_, last = self.touches(UNKNOWN_E, *particles)
-        self.assertIn("effective_sample_size", last)
-        self.assertFalse({"refined", "touch_fit"} & {*last})
-
     def test_of_lines_is_that_of_a_replay(self) -> None:
         expected = self.touches("replay:frames.h5,speed=max")
         rows = csv_lines(self.frames)
@@ -198,20 +191,16 @@ class Live(PreparedTest, StreamTest):
         self.assertIn(f"time runs backwards at {len(rows) // 2} of {len(rows)} frames", said)
 
     def test_of_what_cannot_be_meant_is_refused(self) -> None:
-        (self.folder / "poses.jsonl").write_text('{"time": 1, "x_mm": 0, "y_mm": 0}\n')
         array = ("--array", "6:6:1.9")
         for arguments, *named in (
             (live("nothing"), "--poses", "nothing"),
             (live("nothing", "--poses", "-"), "nothing"),
-            (live("simulate:A,colour=red"), "colour"),
             (live("replay:A.h5"), "A.h5", "rows"),
             (["live", "--sensor", UNKNOWN_E], "--maps", "missing"),
             (["live", "--maps", "maps"], "--sensor"),
             (live(UNKNOWN_E, "--reset-after", "0"), "--reset-after"),
             (live(UNKNOWN_E, "--tare", "-1"), "--tare"),
-            (live(UNKNOWN_E, "--gamma", "1"), "--gamma"),
             (live(UNKNOWN_E, "--json", "no/such.jsonl"), "--json", "no/such.jsonl"),
-            (live(UNKNOWN_E, "--poses", "poses.jsonl"), "poses.jsonl", "theta_rad"),
             (live("-"), "--array", "COLUMNS:ROWS:PITCH"),
             (live("-", *array, "--poses", "-"), "--poses -", "--sensor -", "x_mm"),
             (live("-", *array, "--pressure-unit", "psi"), "--pressure-unit psi", "kPa"),

@@ -2,7 +2,6 @@
 
 import json
 import math
-import unittest
 from typing import Any
 
 from command import PreparedTest

@@ -22,8 +22,9 @@ namespace palpate::cli::record_table_test {
 using testing::HasSubstr;
 using testing::Not;
 
-RecognitionTask sample_task(const HistogramOptions& options = {}) {
+RecognitionTask sample_task(const HistogramOptions& options = {}, bool mirrored = false) {
   std::vector<Hypothesis> maps{{sample_map("A")}, {sample_map("I")}};
+  maps[0].map.mirror = maps[0].mirrored = mirrored;
   maps[1].map.symmetry = 2;
   RecognitionTask task(std::move(maps), options);
   task.map_paths = {"A.map.h5", "I.map.h5"};
@@ -96,6 +97,10 @@ TEST(ResultTable, SaysFirstWhetherToActAndBelowWhereElseTheObjectMayBe) {
   EXPECT_EQ(json["modes"].size(), 3U);
   EXPECT_EQ(json["modes"][1]["object"], "I");
   EXPECT_EQ(json["modes"][1]["covariance"][1][1], 0.09);
+  const RecognitionTask mirrored = sample_task({}, true);
+  EXPECT_THAT(result_table({record}, mirrored), HasSubstr("  A mirrored  0.988"));
+  EXPECT_EQ(to_json(step, mirrored)["mode"]["mirrored"], true);
+  EXPECT_EQ(to_json(step, mirrored)["modes"][0]["mirrored"], true);
 }
 
 TEST(ResultTable, SaysThatTurnsCountAsEqualAndNoDeviationWhereTheBeliefHasNoPeak) {
@@ -241,6 +246,7 @@ TEST(ResultTable, SaysInASentenceWhatDoesNotFit) {
                               "than touches of A do\n"));
   EXPECT_THAT(text, Not(HasSubstr("a.h5: ")));
   EXPECT_THAT(text, Not(HasSubstr("b.h5: ")));
+  EXPECT_EQ(to_json(records[3].last(), sample_task())["contradicted"], true);
 }
 
 TEST(ResultTable, SaysAWarningOfManyRecordingsOnce) {

@@ -1,10 +1,8 @@
 """`palpate record`: what it writes, what it says, and what it leaves where it ends early."""
 
 import math
-import resource
 import signal
 import statistics
-import unittest
 
 from command import Running
 from streams import ONE_TOUCH, StreamTest
@@ -85,18 +83,6 @@ class Record(StreamTest):
         self.assertIn("closed            yes", self.done("info", "--close", "s.h5"))
         self.assertEqual(self.frames_of("s.h5"), frames)
 
-    def test_on_a_full_disk_is_one_line_and_leaves_a_readable_file(self) -> None:
-        for size in (2048, 400_000):  # less than the first rows take, and more
-
-            def limit(size: int = size) -> None:
-                signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-                resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-            flood = ["record", "--sensor", "simulate:A,touches=100,speed=max", "-o", "s.h5"]
-            self.assert_failed(1, flood, "s.h5", "File too large", preexec_fn=limit)
-            self.assertEqual([*self.content()], ["s.h5"] if size > 2048 else [])
-        self.assertGreater(len(self.frames_of("s.h5").time), 100)
-
     # The simulated robot begins its first press after 1.3 s.
     def test_with_a_touched_tare_leaves_what_was_there(self) -> None:
         self.refused("s.h5", ONE_TOUCH, "--tare", "1.6", named=["touched", "element"])
@@ -137,10 +123,7 @@ class Record(StreamTest):
             frames.pressure[i] = [NAN] * 36
         said = self.record_lines("b.h5", frames).stdout
         self.assert_named(said, "258 frames", "3 lost", "258 with a pose", "258 readings unknown")
-        again = self.frames_of("b.h5")
-        kept = [readings for i, readings in enumerate(frames.pressure) if i not in (10, 11, 50)]
-        self.assertEqual(str(again.pressure), str(kept))  # as no NaN equals another
-        self.assertEqual(len(again.array[0]), 3, "with a baseline")
+        self.assertEqual(len(self.frames_of("b.h5").array[0]), 3, "with a baseline")
         self.assert_named(
             self.done("info", "b.h5"), "unknown readings  258 of 9288", "pressure          0 to",
             "lost              3 ", "with a pose       258 ",
@@ -165,7 +148,6 @@ class Record(StreamTest):
 
     def test_of_what_cannot_be_recorded_is_refused(self) -> None:
         self.refused("s.h5", "replay:missing.h5", named=["missing.h5"])
-        self.refused("s.h5", "simulate:A,rate=x", named=["rate", "x"])
         self.refused("s.h5", "simulate:A,speed=max", named=["simulate:A", "--seconds", "touches=N"])
         self.refused("no/s.h5", "simulate:A", named=["no/s.h5", "mkdir"])
         self.refused("s.h5", "simulate:A", "--seconds=-1", named=["--seconds"])

@@ -1,11 +1,9 @@
 #include <algorithm>
 
+#include "io/file_parts.hpp"
 #include "palpate/files.hpp"
-#include "palpate/frame_recorder.hpp"
 #include "palpate/simulation.hpp"
-#include "support/limits.hpp"
 #include "support/program.hpp"
-#include "support/sample_files.hpp"
 
 namespace palpate::touches_test {
 
@@ -63,19 +61,8 @@ TEST_F(TouchesCommand, TouchesAtUnknownPosesAreKeptAtThePoseZero) {
 
 TEST_F(TouchesCommand, StreamThatWasCutOffIsClosedForOthers) {
   const Recording whole = frames_of("A,touches=3");
-  {
-    FrameRecorder recorder(folder_ / "open.h5",
-                           {.elements_mm = whole.elements_mm, .baseline = whole.baseline});
-    for (std::size_t i = 0; i < whole.size(); ++i) {
-      const Touch row = whole.touch(i);
-      recorder.add({.host_time_s = whole.time_s[i],
-                    .values = {row.pressure.begin(), row.pressure.end()},
-                    .T_robot_sensor = row.T_robot_sensor});
-    }
-    recorder.flush();
-    // As a kill leaves it.
-    std::filesystem::copy(folder_ / "open.h5", folder_ / "cut.h5");
-  }
+  std::filesystem::copy(folder_ / "f.h5", folder_ / "cut.h5");
+  leave_open(folder_ / "cut.h5");
   ASSERT_FALSE(read_recording(folder_ / "cut.h5").closed);
   // The touches are found where it cannot be closed: it is left as it is.
   std::filesystem::permissions(folder_ / "cut.h5", std::filesystem::perms::owner_read);
@@ -108,21 +95,6 @@ TEST_F(TouchesCommand, DeadElementsUnitAndSensorAreCopied) {
   EXPECT_EQ(r.pressure_unit, "raw");
   EXPECT_EQ(r.serial, "17");
   EXPECT_EQ(r.valid, frames.valid);
-}
-
-TEST_F(TouchesCommand, AnElementThatIsUnknownInATouchIsNotValidInIt) {
-  Recording frames = frames_of("A,touches=3");
-  for (std::size_t i = 210; i < 310; ++i) {  // the second press lasts from 2.3 to 3 s
-    frames.pressure[36 * i + 5] = nan;
-  }
-  frames.pressure[36 * 50 + 7] = nan;
-  expect_named(said_of(frames), {"3 touches", "101 readings unknown"});
-  const Recording r = read_recording(folder_ / "t.h5");
-  std::vector<std::uint8_t> valid(3 * 36, 1);
-  valid[36 + 5] = 0;
-  EXPECT_EQ(r.valid, valid);
-  EXPECT_EQ(r.pressure[36 + 5], 0.0);
-  done("map t.h5 -o t.map.h5");
 }
 
 TEST_F(TouchesCommand, TouchesWithoutAPoseAreLeftOut) {

@@ -3,7 +3,6 @@
 #include <linux/usbdevice_fs.h>
 #include <umockdev.h>
 
-#include <cerrno>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>

@@ -1,8 +1,5 @@
 // What the headers allow several threads to do at the same time; the preset `threads` runs these
 // tests with ThreadSanitizer. What a child of fork() may do with the objects of its parent.
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <atomic>
 #include <functional>
 #include <optional>
@@ -12,6 +9,7 @@
 #include <vector>
 
 #include "letters.hpp"
+#include "support/child_process.hpp"
 #include "support/scratch_folder.hpp"
 
 namespace palpate::threads_test {
@@ -108,17 +106,6 @@ TEST(Log, TakesTheMessagesOfAllThreadsOneAtATime) {
   EXPECT_EQ(messages, 4);
 }
 
-/// The status with which a child ends that does this.
-int status_of_child(const std::function<int()>& work) {
-  const pid_t child = ::fork();
-  if (child == 0) {
-    ::_exit(work());
-  }
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  return status;
-}
-
 TEST(Fork, RefusesTheParentsObjectsInAChildAndLetsThemBeDestroyed) {
   std::optional<Device> device = Device::open();
   const std::vector<Hypothesis> maps = letter_maps(*device);
@@ -143,10 +130,10 @@ TEST(Fork, RefusesTheParentsObjectsInAChildAndLetsThemBeDestroyed) {
       [&] { PoseHistogram(*device, maps, {.lattice = small_lattice()}); },
       [&] { Device::open(); },
       [&] { Device::list(); }};
-  const int status = status_of_child([&] {
+  const int status = status_of([&] {
     for (std::size_t i = 0; i < uses.size(); ++i) {
       if (input_error(uses[i]).find("belongs to the parent process") == std::string::npos) {
-        return static_cast<int>(i) + 1;
+        ::_exit(static_cast<int>(i) + 1);
       }
     }
     // A belief that the child makes without a device is its own.
@@ -159,7 +146,7 @@ TEST(Fork, RefusesTheParentsObjectsInAChildAndLetsThemBeDestroyed) {
     particles.reset();
     builder.reset();
     device.reset();
-    return same ? 0 : 100;
+    ::_exit(same ? 0 : 100);
   });
   EXPECT_EQ(status, 0) << "use " << WEXITSTATUS(status);
   histogram->update(touches);  // the parent goes on
@@ -171,9 +158,9 @@ TEST(Fork, LetsAChildOpenADeviceWhereItsParentHasClosedAll) {
     Device device = Device::open();
     letter_maps(device);
   }
-  EXPECT_EQ(status_of_child([] {
+  EXPECT_EQ(status_of([] {
               Device device = Device::open();
-              return letter_maps(device).size() == 3 ? 0 : 1;
+              EXPECT_EQ(letter_maps(device).size(), 3U);
             }),
             0);
 }

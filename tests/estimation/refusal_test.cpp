@@ -9,7 +9,6 @@
 #include "beliefs.hpp"
 #include "estimation/displacement_weights.hpp"
 #include "made_up_sensors.hpp"
-#include "palpate/balanced_lattice.hpp"
 #include "palpate/map_builder.hpp"
 #include "support/errors.hpp"
 #include "support/limits.hpp"
@@ -100,12 +99,6 @@ TEST(ParticleOptions, OutOfRangeAreRefused) {
     expect_named(input_error([&] { ParticleFilter(shared_device(), three_objects(), options); }),
                  {name});
   }
-}
-
-TEST(BalancedLattice, OfAMapThatIsNotSoundIsRefused) {
-  Input in;
-  in.map().cell_mm = 1e200;
-  expect_named(input_error([&] { balanced_lattice({}, in.objects); }), {"cell_mm"});
 }
 
 constexpr PoseLattice region{

@@ -2,6 +2,7 @@
 
 #include "estimation/touch_overlap.hpp"
 
+#include <algorithm>
 #include <numbers>
 #include <vector>
 
@@ -76,9 +77,7 @@ TEST(ArrayOverlap, AlongTheAxes) {
   recording.elements_mm = {{-4.0, -1.0}, {4.0, 1.0}};
   recording.pressure = {9.0, 9.0};
   OccupancyGrid map = random_map(8, 4, 1.0, 1.0, 621);
-  for (float& l : map.log_odds) {
-    l = 2.0F;
-  }
+  std::ranges::fill(map.log_odds, 2.0F);
   map.origin_mm = {-3.5, -1.5};  // its box: [-4, 4] x [-2, 2] mm
   for (const double turn : {0.0, std::numbers::pi / 2, std::numbers::pi}) {
     recording.T_robot_sensor = {{{1.0, 0.0}, turn}};
@@ -95,9 +94,7 @@ TEST(ArrayOverlap, AlongTheAxes) {
 TEST(ArrayOverlap, OfOneElementOneBinOrAMapWithoutAnOccupiedCell) {
   const Recording recording = random_recording(4, 1, 631);
   OccupancyGrid empty = random_map(9, 7, 0.5, 1.0, 632);
-  for (float& l : empty.log_odds) {
-    l = -2.0F;
-  }
+  std::ranges::fill(empty.log_odds, -2.0F);
   PoseLattice lattice{.x_mm = {-9.0, 9.0, 19}, .y_mm = {-9.0, 9.0, 18}, .theta_rad = {0, 6, 5}};
   PoseLattice bin{.x_mm = {1.0, 1.0, 1}, .y_mm = {-4.0, 4.0, 1}, .theta_rad = {0.5, 0.5, 1}};
   std::int64_t bins = 0;

@@ -7,7 +7,6 @@
 #include "figures/figures.hpp"
 #include "figures/view.hpp"
 #include "picture.hpp"
-#include "support/errors.hpp"
 #include "support/limits.hpp"
 
 namespace palpate::map_figure_test {

@@ -12,7 +12,6 @@
 #include "palpate/pose_error.hpp"
 #include "palpate/touch.hpp"
 #include "picture.hpp"
-#include "support/errors.hpp"
 #include "support/limits.hpp"
 
 namespace palpate::recognition_sheet_test {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "io/hdf5_writer.hpp"
+#include "support/child_process.hpp"
 #include "support/scratch_folder.hpp"
 
 namespace palpate {
@@ -112,6 +113,13 @@ inline void edit(const std::filesystem::path& path, const std::function<void(hid
   const Hdf5Handle file(H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
   ASSERT_TRUE(file.valid());
   change(file.get());
+}
+
+/// Marks a file as open, as a recorder that was killed leaves it.
+inline void leave_open(const std::filesystem::path& path) {
+  const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  set_appendable(access.get());
+  status_of([&] { H5Fopen(path.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()); });
 }
 
 using Extents = std::vector<hsize_t>;

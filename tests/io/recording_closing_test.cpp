@@ -34,13 +34,6 @@ class RecordingClosing : public OneFile {
     ASSERT_EQ(status, 0);
   }
 
-  // Marks the file as open, as a recorder that was killed leaves it.
-  void leave_open() const {
-    const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-    set_appendable(access.get());
-    status_of([&] { H5Fopen(path_.c_str(), H5F_ACC_RDWR | H5F_ACC_SWMR_WRITE, access.get()); });
-  }
-
   // As other programs open a file: for reading or for writing, without SWMR.
   bool opens(unsigned flags = H5F_ACC_RDONLY) const {
     const Hdf5Session session;
@@ -81,7 +74,7 @@ TEST_F(RecordingClosing, KeepsWholeRowsOnly) {
       EXPECT_GE(H5Dset_extent(dataset_of(file, name).get(), extents.data()), 0) << name;
     }
   });
-  leave_open();
+  leave_open(path_);
   ASSERT_FALSE(opens());
   EXPECT_TRUE(close_recording(path_));
   expect_frames(1000);
@@ -113,7 +106,7 @@ TEST_F(RecordingClosing, ABaselineThatIsHalfWrittenWasNotTaken) {
   };
   unwrite(20, 16);
   EXPECT_TRUE(read_recording(path_).baseline.empty());
-  leave_open();
+  leave_open(path_);
   EXPECT_TRUE(read_recording(path_).baseline.empty());
   EXPECT_TRUE(close_recording(path_));
   EXPECT_TRUE(read_recording(path_).baseline.empty());

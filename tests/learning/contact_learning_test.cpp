@@ -6,9 +6,6 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
 
 #include "learning/table_learning.hpp"
 #include "simulated_presses.hpp"
@@ -253,19 +250,6 @@ TEST(FeatureLearning, LearnsWhichFeaturesGoTogether) {
   const std::vector<LabelledFeatures> proportional{press("A", 1.0), press("A", 1e6)};
   EXPECT_NEAR(learn_features(proportional).any.correlation[0], 0.999, 1e-6)
       << "rounding in a file breaks none so high";
-}
-
-TEST(FeatureLearning, DensityIsThatOfTheCovariance) {
-  FeatureDistribution distribution{
-      .mean = {1.0, 2.0, 3.0}, .sd = {0.5, 2.0, 1.0}, .correlation = {0.6, -0.3, 0.2}};
-  // -z^T C^-1 z / 2 - log sqrt((2 pi)^3 det C); the sd multiply to 1.
-  const glm::dmat3 c{{1.0, 0.6, -0.3}, {0.6, 1.0, 0.2}, {-0.3, 0.2, 1.0}};
-  const glm::dvec3 z{1.0, -0.5, 2.0};
-  const double expected = -0.5 * glm::dot(z, glm::inverse(c) * z) - 1.5 * std::log(two_pi) -
-                          0.5 * std::log(glm::determinant(c));
-  EXPECT_NEAR(distribution.log_density({{1.5, 1.0, 5.0}}), expected, 1e-12);
-  distribution.correlation = {0.9, 0.9, -0.9};
-  EXPECT_TRUE(std::isnan(distribution.log_density({{1.5, 1.0, 5.0}})));
 }
 
 TEST(FeatureLearning, OfOnePressEachTakesAllPressesAndOfOneIsFinite) {

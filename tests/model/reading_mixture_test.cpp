@@ -8,8 +8,6 @@
 #include "palpate/fit.hpp"
 #include "palpate/touch.hpp"
 #include "support/every_set_of_instructions.hpp"
-#include "support/limits.hpp"
-#include "support/synthetic.hpp"
 
 namespace palpate::reading_mixture_test {
 

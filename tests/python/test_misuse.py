@@ -124,23 +124,15 @@ def test_progress_and_timeouts_are_checked_before_the_work(belief: palpate.PoseH
 
 WITHOUT_VULKAN = """
 import palpate
-
-assert len(palpate.simulate("A", palpate.random_poses(3, seed=1))) == 3
-for use in (lambda: palpate.open_sensor("tsf85:none").start(), palpate.Device.open, palpate.Device.list):
-    try:
-        use()
-    except palpate.Error as error:
-        print(f"{error.fault}: {error}")
+print(len(palpate.simulate("A")))
+try:
+    palpate.Device.open()
+except palpate.Error as error:
+    print(f"{error.fault}: {error}")
 """
 
 
-def test_a_missing_loader_of_vulkan_is_an_error_that_names_the_packages() -> None:
+def test_a_missing_loader_of_vulkan_is_the_machines_fault_where_a_device_is_asked_for() -> None:
     library = "/nonexistent/libvulkan.so.1"
     done = python(WITHOUT_VULKAN, PALPATE_VULKAN_LIBRARY=library)
-    assert done.returncode == 0, done.stderr
-    board, *vulkan = done.stdout.splitlines()
-    assert "not plugged in" in board
-    assert len(vulkan) == 2
-    for line in vulkan:
-        assert line.startswith(f"system: Vulkan cannot be loaded: {library}: ")
-        assert line.endswith("on Debian, install libvulkan1 and mesa-vulkan-drivers")
+    assert done.stdout.startswith(f"192\nsystem: Vulkan cannot be loaded: {library}: "), done.stderr

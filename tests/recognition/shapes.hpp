@@ -12,6 +12,7 @@
 #include "palpate/simulation.hpp"
 #include "recognition/recognition_record.hpp"
 #include "recognition/recognition_task.hpp"
+#include "support/sample_files.hpp"
 #include "support/shared_device.hpp"
 #include "support/synthetic.hpp"
 #include "support/touched_shape.hpp"
@@ -108,14 +109,8 @@ inline const std::vector<Hypothesis>& learned_letters() {
 inline Recording letter_touches(const std::string& letter, int touches, std::uint64_t seed) {
   Pose T_object_robot = random_object_pose(seed);
   T_object_robot.translation_mm *= 0.8;
-  std::vector<Pose> T_robot_sensor = random_poses(touches, seed);
-  for (Pose& pose : T_robot_sensor) {
-    pose = inverse(T_object_robot) * pose;
-  }
-  Recording recording = Simulator(make_shape(letter), {}, digitacts_array(), seed)
-                            .touch(T_robot_sensor, T_object_robot);
-  recording.path = letter;
-  recording.truth = {.object = letter, .T_object_robot = T_object_robot};
+  Recording recording = sample_unknown(letter, T_object_robot, touches, seed);
+  recording.path = recording.object = letter;
   return recording;
 }
 

@@ -2,13 +2,9 @@
 
 #include <fcntl.h>
 #include <linux/capability.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <csignal>
 #include <iterator>
 #include <sstream>
 #include <string_view>
@@ -16,6 +12,8 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+
+#include "support/child_process.hpp"
 
 namespace palpate {
 
@@ -28,13 +26,6 @@ void redirect(int descriptor, const std::filesystem::path& file) {
     ::_exit(126);
   }
   ::close(opened);
-}
-
-void limit_files(rlim_t bytes) {
-  // Ignored, so that a write beyond the limit fails like one to a full disk.
-  std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit limit{.rlim_cur = bytes, .rlim_max = bytes};
-  ::setrlimit(RLIMIT_FSIZE, &limit);
 }
 
 /// In a forked child: becomes the program, in the folder.
@@ -88,11 +79,12 @@ Outcome run_program(const std::filesystem::path& folder, const std::vector<std::
       ::close(stream);
     }
     if (surroundings.largest_file_bytes) {
-      limit_files(*surroundings.largest_file_bytes);
+      // Ignored, so that a write beyond the limit fails like one to a full disk.
+      std::signal(SIGXFSZ, SIG_IGN);
+      limit_process(RLIMIT_FSIZE, *surroundings.largest_file_bytes);
     }
     if (surroundings.memory_bytes) {
-      const rlimit limit{.rlim_cur = *surroundings.memory_bytes, .rlim_max = RLIM_INFINITY};
-      ::setrlimit(RLIMIT_DATA, &limit);
+      limit_process(RLIMIT_DATA, *surroundings.memory_bytes);
     }
     if (surroundings.obeys_permissions) {
       ::prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE);  // of anybody but root: not permitted, nor needed

@@ -6,20 +6,6 @@
 
 namespace palpate {
 
-namespace {
-
-Recording touch(const std::string& letter, const Pose& T_object_robot, int touches) {
-  constexpr std::uint64_t seed = 20110509;
-  std::vector<Pose> T_robot_sensor = random_poses(touches, seed);
-  for (Pose& pose : T_robot_sensor) {
-    pose = inverse(T_object_robot) * pose;
-  }
-  return Simulator(make_shape(letter), {}, digitacts_array(), seed)
-      .touch(T_robot_sensor, T_object_robot);
-}
-
-}  // namespace
-
 OccupancyGrid sample_map(const std::string& letter, double cell_mm) {
   const Shape shape = make_shape(letter);
   OccupancyGrid map;
@@ -36,15 +22,24 @@ OccupancyGrid sample_map(const std::string& letter, double cell_mm) {
   return map;
 }
 
-Recording sample_unknown(const std::string& letter, const Pose& T_object_robot, int touches) {
-  Recording recording = touch(letter, T_object_robot, touches);
+Recording sample_unknown(const std::string& letter, const Pose& T_object_robot, int touches,
+                         std::uint64_t seed) {
+  std::vector<Pose> T_robot_sensor = random_poses(touches, seed);
+  for (Pose& pose : T_robot_sensor) {
+    pose = inverse(T_object_robot) * pose;
+  }
+  Recording recording = Simulator(make_shape(letter), {}, digitacts_array(), seed)
+                            .touch(T_robot_sensor, T_object_robot);
   recording.object.clear();
   recording.truth = {.object = letter, .T_object_robot = T_object_robot};
   return recording;
 }
 
 Recording sample_training(const std::string& letter, int touches) {
-  return touch(letter, {}, touches);
+  Recording recording = sample_unknown(letter, {}, touches);
+  recording.object = letter;
+  recording.truth.reset();
+  return recording;
 }
 
 Recording sample_presses(const std::string& shape, int presses, std::uint64_t seed) {

@@ -13,7 +13,8 @@ namespace palpate {
 OccupancyGrid sample_map(const std::string& letter, double cell_mm = 1.0);
 
 /// Simulated touches of a letter at this pose T_object_robot, which is stored as the truth.
-Recording sample_unknown(const std::string& letter, const Pose& T_object_robot, int touches);
+Recording sample_unknown(const std::string& letter, const Pose& T_object_robot, int touches,
+                         std::uint64_t seed = 20110509);
 
 /// Simulated touches of a letter at known poses, to build a map of.
 Recording sample_training(const std::string& letter, int touches);

@@ -101,31 +101,6 @@ TEST(BoundedPosterior, CanBeCancelledInEveryCallThatSearches) {
   }
 }
 
-TEST(BoundedPosterior, MovesItsPivotOnlyBeforeATouch) {
-  const Recording recording = touches_of_l(2, 812);
-  BoundedOptions options = small_options();
-  options.none_weight = 0.5;
-  BoundedPosterior moved(two_shapes(), options);
-  moved.estimate();
-  moved.move_pivot({-3.0, 4.0});
-  options.lattice.pivot_mm = {-3.0, 4.0};
-  BoundedPosterior made(two_shapes(), options);
-  EXPECT_EQ(all_answers(moved, 2), all_answers(made, 2));
-  moved.update(all_touches(recording));
-  made.update(all_touches(recording));
-  const auto told = all_answers(made, 2);
-  EXPECT_EQ(all_answers(moved, 2), told);
-  expect_named(input_error([&] {
-                 moved.move_pivot({1.0, 1.0});
-               }),
-               {"call reset() before the pivot moves"});
-  EXPECT_EQ(all_answers(moved, 2), told);
-  moved.reset();
-  expect_named(input_error([&] { moved.move_pivot({nan, 0.0}); }), {"pivot_mm"});
-  moved.update(all_touches(recording));
-  EXPECT_EQ(all_answers(moved, 2), told) << "the pivot stays over reset()";
-}
-
 // Asked on purpose, each of them. NOLINTBEGIN(bugprone-use-after-move)
 TEST(BoundedPosterior, SaysThatItWasMovedFrom) {
   const Recording recording = random_recording(1, 36, 813);
@@ -192,12 +167,7 @@ TEST(BoundedPosterior, RefusesQuestionsOutOfRange) {
   for (const double tolerance : {0.0, 1.0, nan}) {
     refused([&] { posterior.estimate(tolerance); }, "tolerance");
   }
-  const std::vector<glm::dvec2> array = digitacts_array();
-  const std::vector<Pose> candidates{{}};
-  refused([&] { posterior.expected_gain({}, array); }, "no candidate");
-  refused([&] { posterior.expected_gain(candidates, {}); }, "no living element");
-  refused([&] { posterior.expected_gain(candidates, array, {.samples = 1}); }, "samples = 1");
-  refused([&] { posterior.expected_gain(candidates, array, {.label_of = {0}}); }, "label_of");
+  refused([&] { posterior.expected_gain({}, digitacts_array()); }, "no candidate");
 }
 
 }  // namespace palpate::bounded_posterior_test

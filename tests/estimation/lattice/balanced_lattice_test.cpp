@@ -10,6 +10,7 @@
 #include "palpate/pose_histogram.hpp"
 #include "palpate/simulation.hpp"
 #include "palpate/touch.hpp"
+#include "support/errors.hpp"
 #include "support/synthetic.hpp"
 #include "support/touched_shape.hpp"
 
@@ -174,7 +175,7 @@ TEST(BalancedLattice, IsMadeCoarserAlikeToKeepToABound) {
   EXPECT_THROW(fine_lattice({}, letters(), 4), Error) << "fewer bins than objects";
 }
 
-TEST(BalancedLattice, OfAnEndlessRegionIsBounded) {
+TEST(BalancedLattice, OfAnEndlessRegionIsBoundedAndOfAnUnsoundMapIsRefused) {
   PoseLattice region;
   region.x_mm = {-farthest_mm, farthest_mm, 1};
   region.y_mm = {-farthest_mm, farthest_mm, 1};
@@ -187,6 +188,9 @@ TEST(BalancedLattice, OfAnEndlessRegionIsBounded) {
     EXPECT_THROW(fine_lattice(region, letters()), Error);
   }
   EXPECT_THROW(fine_lattice({}, {}), Error);
+  Hypothesis unsound = letter("O");
+  unsound.map.cell_mm = 1e200;
+  expect_named(input_error([&] { fine_lattice({}, std::span(&unsound, 1)); }), {"cell_mm"});
 }
 
 TEST(BalancedLattice, FitsTheDevice) {

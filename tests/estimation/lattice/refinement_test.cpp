@@ -147,8 +147,8 @@ TEST_P(Refinement, HasTheGoldenPosesAndCovariances) {
             {lattice.pivot_mm, 0.0});
   PoseHistogram histogram(shared_device(), std::span(&object, 1), {.lattice = lattice});
   histogram.update(all_touches(recording));
-  const reference::Posterior expected =
-      reference_posterior(std::span(&object, 1), {.lattice = lattice}, all_touches(recording));
+  const reference::Posterior expected = reference_posterior(
+      std::span(&object, 1), HistogramOptions{.lattice = lattice}, all_touches(recording));
   const auto in_boxes = [&](std::span<const BinBox> boxes) {
     std::vector<double> values;
     for (const BinBox& box : boxes) {
