@@ -132,6 +132,7 @@ def for_ever():
         recognize(show)
 
 def end():
+    recognize(lambda fraction: None)  # a callback that had begun goes on to its end meanwhile
     before = len(shown)
     for _ in range(5):
         recognize(lambda fraction: None)  # on the thread that ends the interpreter, which may
