@@ -255,7 +255,7 @@ void live(const LiveArguments& options) {
   judge_frames(state);
   if (state.all_touches == 0 && state.without_pose > 0 && !interruption.requested()) {
     refuse(source, "none of its {} touches has a pose; {}", state.without_pose,
-           !options.poses.empty()    ? "give --poses whose times, s since 1970, are the frames'"
+           !options.poses.empty()    ? "give --poses at the frames' times, in s since 1970"
            : opened.lines != nullptr ? "give --poses, or x_mm, y_mm and theta_rad in its lines"
                                      : "give --poses");
   }

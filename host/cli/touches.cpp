@@ -126,11 +126,10 @@ class PressWatch {
   /// @param unit of the pressures
   std::vector<std::string> reasons(const std::string& unit) const {
     if (missed_ == 0 && largest_ > options_.onset) {
-      return {
-          fmt::format("its readings reach {:.3g} {} above their rest, but no two frames of a press "
-                      "lie less than "
-                      "{:g} s apart by their times (give times in seconds, and more frames)",
-                      largest_, unit, options_.largest_gap_s)};
+      return {fmt::format(
+          "its readings reach {:.3g} {} above their rest, but no two frames of a press lie less "
+          "than {:g} s apart by their times (give times in seconds, and more frames)",
+          largest_, unit, options_.largest_gap_s)};
     }
     if (missed_ == 0) {
       return {fmt::format(

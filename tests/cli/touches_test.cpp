@@ -128,6 +128,9 @@ TEST_F(TouchesCommand, SaysWhatMayCostTouches) {
   }
   falls.baseline.clear();
   expect_no_touches(falls, {"f.h5: its readings fall in presses", "--sign -1"});
+  Recording seldom = frames;
+  std::ranges::for_each(seldom.time_s, [](double& time_s) { time_s *= 1000.0; });
+  expect_no_touches(seldom, {"no two frames of a press lie less than 0.5 s apart"});
   Recording swapped = frames;
   for (std::size_t i = 0; i + 1 < frames.size(); i += 2) {
     std::swap(swapped.time_s[i], swapped.time_s[i + 1]);

@@ -92,3 +92,7 @@ def test_a_recording_without_touches_says_why(
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
     assert said in done.stderr
     assert not (tmp_path / "t.h5").exists()
+
+
+def test_strokes_shorter_than_their_parts_say_so(tmp_path: pathlib.Path) -> None:
+    assert "give a smaller --slide" in cut(tmp_path, STROKES, "--steady", "0.05", "--slide", "50").stderr

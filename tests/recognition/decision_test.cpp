@@ -366,23 +366,21 @@ TEST(LeastTurned, CarriesTheCovarianceAsTurningEverySampleDoes) {
   const RefinedPose refined{
       .T_object_robot = {{40.0, 10.0}, 2.5},
       .covariance = {0.04, 0.01, 0.002, 0.01, 0.09, 0.001, 0.002, 0.001, 0.01}};
-  const auto coordinates = [](const Pose& pose) {
-    return glm::dvec3(pose.translation_mm, pose.theta_rad);
-  };
+  const glm::dvec3 here(refined.T_object_robot.translation_mm, refined.T_object_robot.theta_rad);
   for (const int symmetry : {2, 0}) {
     const RefinedPose turned = least_turned(body, symmetry, refined);
-    EXPECT_NE(turned.T_object_robot.theta_rad, refined.T_object_robot.theta_rad);
-    const auto turned_back = [&](const Pose& pose) {
-      return coordinates(inverse(least_turned(body, symmetry, pose)));
+    EXPECT_NE(turned.T_object_robot.theta_rad, here.z);
+    const auto turned_back = [&](const glm::dvec3& at) {
+      const Pose pose = inverse(least_turned(body, symmetry, Pose{glm::dvec2(at), at.z}));
+      return glm::dvec3(pose.translation_mm, pose.theta_rad);
     };
     // Differences of turned poses near the refined one, along each axis.
     constexpr double step = 1e-7;
     glm::dmat3 jacobian;  // by columns
     for (int axis = 0; axis < 3; ++axis) {
-      glm::dvec3 near = coordinates(refined.T_object_robot);
+      glm::dvec3 near = here;
       near[axis] += step;
-      jacobian[axis] =
-          (turned_back({glm::dvec2(near), near.z}) - turned_back(refined.T_object_robot)) / step;
+      jacobian[axis] = (turned_back(near) - turned_back(here)) / step;
     }
     const glm::dmat3 expected =
         jacobian * glm::make_mat3(refined.covariance.data()) * glm::transpose(jacobian);

@@ -121,9 +121,12 @@ TEST(LabelProbability, IsNotTemperedByTouchesThatTellNothing) {
 TEST(LabelProbability, ReachesEvidenceBelowEveryNumber) {
   RecognitionTask task = two_labels();
   task.sensor.temperature = 1000.0;
-  const Estimate estimate{.identity = {1.0, 0.0, 0.0}, .log_evidence = {0.0, -2000.0, -9000.0}};
-  const RecognitionStep step = judge(estimate, {}, task);
-  EXPECT_NEAR(step.identity[1] / step.identity[0], std::exp(-2.0), 1e-14);
+  for (const auto& [best, rounding] : {std::pair{0.0, 1e-14}, {-2e6, 1e-12}}) {
+    const Estimate estimate{.identity = {1.0, 0.0, 0.0},
+                            .log_evidence = {best, best - 2000.0, best - 9000.0}};
+    const RecognitionStep step = judge(estimate, {}, task);
+    EXPECT_NEAR(step.identity[1] / step.identity[0], std::exp(-2.0), rounding);
+  }
 }
 
 TEST(LabelProbability, PassesOverTouchesWithoutContact) {
