@@ -206,9 +206,13 @@ TEST(PartsAway, LieAsNearWhereverTheRobotsOriginIs) {
   const RefinedPose far{near * Pose{-away_mm, 0.0},
                         carried_over(glm::make_mat3(covariance.data()), jacobian)};
   const auto held_mm = [&](const RefinedPose& refined) {
-    return distance_holding(spread_between_bins(of, {{0.4, 1.0}}, refined), 0.9).value();
+    return distance_holding(spread_between_bins(of, {{0.4, 1.0}}, refined), 0.6827).value();
   };
   EXPECT_NEAR(held_mm(far), held_mm({near, covariance}), 1e-6);
+  // A turn moves the body's middle about the robot's origin, and the body about its middle.
+  const double lever_mm =
+      std::hypot(glm::distance(near.translation_mm, of.body.centroid_mm), spin_mm(of.body));
+  EXPECT_NEAR(held_mm({near, {0, 0, 0, 0, 0, 0, 0, 0, 1e-4}}), 0.01 * lever_mm, 5e-4 * lever_mm);
 }
 
 }  // namespace palpate::belief_modes_test
