@@ -1,15 +1,17 @@
 #include "cli/commands.hpp"
 
+#include <cstdint>
 #include <optional>
 #include <random>
-#include <regex>
 #include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "cli/command_files.hpp"
 #include "cli/options.hpp"
+#include "model/number_text.hpp"
 #include "options/option.hpp"
 #include "palpate/files.hpp"
 #include "palpate/simulation.hpp"
@@ -33,9 +35,12 @@ std::vector<Pose> sensor_poses(const std::string& text, std::uint64_t seed) {
   if (text == "grid") {
     return training_grid();
   }
-  static const std::regex random("random:0*([1-9][0-9]{0,8})");
-  if (std::smatch count; std::regex_match(text, count, random)) {
-    return random_poses(std::stoi(count[1]), seed);
+  constexpr std::string_view random = "random:";
+  constexpr std::int64_t most_poses = 999'999'999;
+  const auto count =
+      text.starts_with(random) ? whole_number_of(text.substr(random.size())) : std::nullopt;
+  if (count && *count > 0 && *count <= most_poses) {
+    return random_poses(static_cast<int>(*count), seed);
   }
   refuse_flag("--poses", text, "give grid, or random:N with N above 0");
 }

@@ -25,7 +25,7 @@ double widest_along(const Axis& axis) {
   return axis.count > 1 ? axis.upper - axis.lower : std::numeric_limits<double>::infinity();
 }
 
-void require(double sd, double widest, const char* name, const char* unit) {
+void require_sd(double sd, double widest, const char* name, const char* unit) {
   if (!(sd >= 0.0 && std::isfinite(sd))) {
     throw Error(Fault::input,
                 fmt::format("{} {} = {}: give a finite number from 0", name, unit, sd));
@@ -141,8 +141,8 @@ DisplacementSd widest_displacement(const PoseLattice& lattice) {
 
 void validate_displacement(const DisplacementSd& sd, const PoseLattice& lattice, const char* name) {
   const DisplacementSd widest = widest_displacement(lattice);
-  require(sd.mm, widest.mm, name, "mm");
-  require(sd.rad, widest.rad, name, "rad");
+  require_sd(sd.mm, widest.mm, name, "mm");
+  require_sd(sd.rad, widest.rad, name, "rad");
 }
 
 std::optional<std::string> unresolved_by_steps(const DisplacementSd& sd, const PoseLattice& lattice,

@@ -11,9 +11,7 @@ namespace palpate {
 
 namespace {
 
-constexpr double margin_px = 40.0;
-constexpr double gap_px = 24.0;
-constexpr double axis_px = 84.0;     ///< to the left of each map
+constexpr double maps_apart_px = 24.0;
 constexpr double below_px = 60.0;    ///< below each map, for its axis
 constexpr double title_px = 60.0;    ///< above the maps
 constexpr double label_px = 34.0;    ///< above each map
@@ -43,8 +41,8 @@ Grid arrange(std::span<const OccupancyGrid> maps) {
   for (const OccupancyGrid& map : maps) {
     extent_mm = glm::max(extent_mm, map.cell_mm * glm::dvec2(map.nx, map.ny));
   }
-  const double side_px =
-      std::clamp(tiles_px / grid.columns - axis_px - gap_px, smallest_tile_px, largest_tile_px);
+  const double side_px = std::clamp(tiles_px / grid.columns - axis_px - maps_apart_px,
+                                    smallest_tile_px, largest_tile_px);
   grid.px_per_mm = side_px / std::max(extent_mm.x, extent_mm.y);
   // A narrow map still needs width for its label.
   grid.tile_px = glm::max(glm::ceil(grid.px_per_mm * extent_mm), glm::dvec2(smallest_tile_px, 1.0));
@@ -91,10 +89,10 @@ std::string draw_maps(std::span<const OccupancyGrid> maps) {
   const EvidenceScale scale = evidence_scale(maps);
   const Grid grid = arrange(maps);
 
-  const double column_px = axis_px + grid.tile_px.x + gap_px;
-  const double tiles_width = grid.columns * column_px - gap_px;
+  const double column_px = axis_px + grid.tile_px.x + maps_apart_px;
+  const double tiles_width = grid.columns * column_px - maps_apart_px;
   const double content = std::max(tiles_width, bar_px + 2 * bar_inset_px);
-  const double row_px = label_px + grid.tile_px.y + below_px + gap_px;
+  const double row_px = label_px + grid.tile_px.y + below_px + maps_apart_px;
   const double legend_top = title_px + margin_px + grid.rows * row_px;
   Canvas canvas(static_cast<int>(content + 2 * margin_px),
                 static_cast<int>(legend_top + legend_px));

@@ -25,9 +25,7 @@ namespace palpate {
 
 namespace {
 
-constexpr double margin_px = 40.0;
 constexpr double side_px = 480.0;  ///< of every panel's plot
-constexpr double axis_px = 84.0;   ///< to the left of every plot
 constexpr double gap_px = 40.0;    ///< between a plot and the next one's axis
 constexpr double top_px = 256.0;   ///< of the plots
 constexpr double bar_top_px = top_px + side_px + 104.0;

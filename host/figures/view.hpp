@@ -42,6 +42,9 @@ struct View {
   bool contains(glm::dvec2 data) const;
 };
 
+inline constexpr double margin_px = 40.0;  ///< around a picture
+inline constexpr double axis_px = 84.0;    ///< to the left of a plot
+
 inline constexpr Font body{20.0};
 inline constexpr Font small{18.0};
 inline constexpr Font heading{24.0, true};

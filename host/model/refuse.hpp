@@ -16,4 +16,11 @@ template <typename... Parts>
   throw Error(Fault::input, fmt::format("{}: {}", source.string(), fmt::format(message, parts...)));
 }
 
+/// Throws Error (Fault::input), "<name> = <value>: <remedy>", unless it holds.
+inline void require(bool sound, const char* name, double value, const char* remedy) {
+  if (!sound) {
+    throw Error(Fault::input, fmt::format("{} = {}: {}", name, value, remedy));
+  }
+}
+
 }  // namespace palpate

@@ -31,7 +31,7 @@ bool is_a(PyObject* object, const char* name) noexcept {
   }
 }
 
-using Shape = std::vector<std::size_t>;
+using Extent = std::vector<std::size_t>;
 
 Error other_shape(nb::handle of, const char* name) {
   return Error(Fault::input, fmt::format("{}: was given another shape; make another {}", name,
@@ -42,7 +42,7 @@ Error other_shape(nb::handle of, const char* name) {
 /// the pressure is trusted, and others are checked by it at every use.
 struct Extents {
   explicit Extents(nb::handle of) {
-    const Shape shape = in_place<double>(of.attr("pressure"), "pressure").shape;
+    const Extent shape = in_place<double>(of.attr("pressure"), "pressure").shape;
     const bool has_rows = is_recording(of.ptr());
     if (shape.size() != (has_rows ? 2 : 1)) {
       throw other_shape(of, "pressure");
@@ -58,13 +58,13 @@ struct Extents {
 /// An attribute's array, which has this shape or n times; none for None.
 template <typename Value>
 std::optional<Array<Value>> array_in(nb::handle of, const char* name, std::size_t n,
-                                     const Shape& row) {
+                                     const Extent& row) {
   nb::object given = of.attr(name);
   if (given.is_none()) {
     return std::nullopt;
   }
   Array<Value> array = in_place<Value>(std::move(given), name);
-  Shape rows = row;
+  Extent rows = row;
   rows.insert(rows.begin(), n);
   if (array.shape != row && array.shape != rows) {
     throw other_shape(of, name);
@@ -78,7 +78,7 @@ Value value_in(nb::handle of, const char* name) {
 }
 
 template <typename Row>
-std::vector<Row> copied(nb::handle of, const char* name, std::size_t n, const Shape& row) {
+std::vector<Row> copied(nb::handle of, const char* name, std::size_t n, const Extent& row) {
   const auto array = array_in<NumberOf<Row>>(of, name, n, row);
   return array ? array->template copied<Row>() : std::vector<Row>();
 }
@@ -86,7 +86,7 @@ std::vector<Row> copied(nb::handle of, const char* name, std::size_t n, const Sh
 /// Views of [n] rows of an attribute's array, each of this shape; of an array of one row, the same
 /// for all.
 template <typename Row>
-auto rows_of(nb::handle of, const char* name, std::size_t n, const Shape& row) {
+auto rows_of(nb::handle of, const char* name, std::size_t n, const Extent& row) {
   const auto array = array_in<NumberOf<Row>>(of, name, n, row);
   const std::span<const Row> all = array ? array->template rows<Row>() : std::span<const Row>();
   const std::size_t each = std::is_same_v<Row, Pose> ? 1 : row.front();

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <regex>
+#include <cstdint>
 #include <string>
 #include <thread>
 #include <utility>
@@ -17,6 +17,7 @@
 #include "cli/recognition_flags.hpp"
 #include "cli/results_folder.hpp"
 #include "io/input_file.hpp"
+#include "model/number_text.hpp"
 #include "recognition/batch/batch_task.hpp"
 #include "recognition/batch/input_reading.hpp"
 #include "recognition/request.hpp"
@@ -79,19 +80,18 @@ struct Shard {
 
 /// The shard of a flag's "I/N"; the whole where it is "".
 Shard shard_of(const std::string& flag) {
-  constexpr std::size_t most_shards = 1'000'000;
-  static const std::regex form("([0-9]{1,7})/([0-9]{1,7})");
-  std::smatch numbers;
-  Shard shard;
-  if (std::regex_match(flag, numbers, form)) {
-    shard = {std::stoul(numbers[1]), std::stoul(numbers[2])};
+  constexpr std::int64_t most_shards = 1'000'000;
+  if (flag.empty()) {
+    return {};
   }
-  if ((!flag.empty() && numbers.empty()) || shard.index >= shard.count ||
-      shard.count > most_shards) {
+  const std::size_t slash = std::min(flag.find('/'), flag.size() - 1);
+  const auto index = whole_number_of(flag.substr(0, slash)).value_or(-1);
+  const auto count = whole_number_of(flag.substr(slash + 1)).value_or(-1);
+  if (index < 0 || index >= count || count > most_shards) {
     refuse_flag("--shard", flag, "give it as I/N, with I from 0 to N - 1 and N up to {}",
                 most_shards);
   }
-  return shard;
+  return {static_cast<std::size_t>(index), static_cast<std::size_t>(count)};
 }
 
 /// The cores that this process may use: a job's or those of taskset.

@@ -5,8 +5,9 @@
 #include <filesystem>
 #include <functional>
 #include <iterator>
-#include <regex>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -15,6 +16,7 @@
 #include "io/recording_file.hpp"
 #include "io/recording_rules.hpp"
 #include "io/recording_survey.hpp"
+#include "model/number_text.hpp"
 #include "palpate/files.hpp"
 #include "recognition/judged_results.hpp"
 #include "recognition/record_json.hpp"
@@ -274,16 +276,21 @@ std::string ViewedFiles::list() const {
 }
 
 std::optional<std::string> ViewedFiles::get(const std::string& path) const {
-  static const std::regex form("/file/([0-9]{1,9})(/(rows|record|map)/([0-9]{1,9}))?");
-  std::smatch asked;
-  if (!std::regex_match(path, asked, form) || std::stoul(asked[1]) >= files_.size()) {
+  const std::vector<std::string_view> asked = split_text(path, '/');
+  if ((asked.size() != 3 && asked.size() != 5) || asked[1] != "file") {
     return {};
   }
-  const ViewedFile& file = files_[std::stoul(asked[1])];
-  if (!asked[2].matched) {
+  const auto number_at = [&](std::size_t i) {  // of what is no number: beyond all
+    return static_cast<std::size_t>(whole_number_of(asked[i]).value_or(-1));
+  };
+  if (number_at(2) >= files_.size()) {
+    return {};
+  }
+  const ViewedFile& file = files_[number_at(2)];
+  if (asked.size() == 3) {
     return file.overview;
   }
-  const Json part = file.part(asked[3], std::stoul(asked[4]));
+  const Json part = file.part(std::string(asked[3]), number_at(4));
   return part.is_null() ? std::nullopt : std::optional(text_of(part));
 }
 

@@ -15,22 +15,16 @@
 #include "estimation/log_sum.hpp"
 #include "model/map_likelihood.hpp"
 #include "model/own_process.hpp"
+#include "model/refuse.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
 
 namespace {
 
-/// @throws Error unless it holds
-void require(bool sound, const char* field, double value, const char* remedy) {
-  if (!sound) {
-    throw Error(Fault::input, fmt::format("{} = {}: give {}", field, value, remedy));
-  }
-}
-
 void require_tolerance(double tolerance) {
   require(tolerance > 0.0 && tolerance < 1.0, "tolerance", tolerance,
-          "a share of the mass between 0 and 1, such as 1e-6");
+          "give a share of the mass between 0 and 1, such as 1e-6");
 }
 
 /// The options, with what follows from them and the hypotheses.
@@ -42,12 +36,13 @@ BoundedOptions checked(const BoundedOptions& options, std::span<const Hypothesis
                                    const char* remedy) {
     require(!value || (*value > 0.0 && std::isfinite(*value)), field, value.value_or(0.0), remedy);
   };
-  require_positive(options.budget_s, "budget_s", "a positive number of seconds, or none");
-  require_positive(options.evidence_nats, "evidence_nats", "a positive number of nats, or none");
+  require_positive(options.budget_s, "budget_s", "give a positive number of seconds, or none");
+  require_positive(options.evidence_nats, "evidence_nats",
+                   "give a positive number of nats, or none");
   require(options.evidence_growth >= 0.0 && std::isfinite(options.evidence_growth),
-          "evidence_growth", options.evidence_growth, "a number from 0");
-  require_positive(options.none_weight, "none_weight", "a positive number, or none");
-  require(options.threads >= 0, "threads", options.threads, "at least 1, or 0 for all cores");
+          "evidence_growth", options.evidence_growth, "give a number from 0");
+  require_positive(options.none_weight, "none_weight", "give a positive number, or none");
+  require(options.threads >= 0, "threads", options.threads, "give at least 1, or 0 for all cores");
   BoundedOptions all = options;
   all.lattice.collapse_fixed().validate();
   validate_displacement(all.touch_sd, all.lattice, "touch_sd");

@@ -16,6 +16,7 @@
 #include "estimation/particles/parzen_mode.hpp"
 #include "gpu/command_stream.hpp"
 #include "model/own_process.hpp"
+#include "model/refuse.hpp"
 #include "palpate/error.hpp"
 #include "shaders/draw_particles.hpp"
 #include "shaders/sum_weights.hpp"
@@ -29,12 +30,6 @@ using gpu::Access;
 constexpr int most_particles = 1'000'000;
 // Beyond, float32 would no longer place a particle to a hundredth of a millimetre.
 constexpr double widest_mm = 100'000.0;
-
-void require(bool sound, const char* name, double value, const char* remedy) {
-  if (!sound) {
-    throw Error(Fault::input, fmt::format("{} = {}: {}", name, value, remedy));
-  }
-}
 
 /// Throws Error on a number of particles, a region, a noise or a rate out of range.
 void validate(const ParticleOptions& options) {
