@@ -194,8 +194,7 @@ void require_flat(const CsvTable& table, std::span<const UnitColumn> rotations) 
 }
 
 /// The numbers of the columns; none where all cells are empty.
-std::vector<double> numbers_in(const CsvTable& table, const PoseColumns& pose) {
-  const std::vector<UnitColumn>& columns = pose.columns;
+std::vector<double> numbers_in(const CsvTable& table, std::span<const UnitColumn> columns) {
   std::vector<double> values;
   std::vector<std::string> empty;
   for (const UnitColumn& column : columns) {
@@ -268,15 +267,17 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
   }
   PoseRules rules{pose.form, {}};
   std::ranges::transform(pose.columns, std::back_inserter(rules.units), &UnitColumn::unit);
-  CsvTable again = open_table(path, options);
-  complete(
-      rules, options,
-      [&](std::vector<double>& row) {
-        const bool has_row = again.next();
-        row = has_row ? numbers_in(again, pose) : std::vector<double>();
-        return has_row;
-      },
-      [&](const std::string& why) { again.refuse("{}", why); }, path.string());
+  std::optional<CsvTable> again;
+  const NextRow next = [&](std::vector<double>& row) {
+    if (!again) {
+      again.emplace(open_table(path, options));
+    }
+    const bool has_row = again->next();
+    row = has_row ? numbers_in(*again, pose.columns) : std::vector<double>();
+    return has_row;
+  };
+  const auto refuse_again = [&](const std::string& why) { again->refuse("{}", why); };
+  complete(rules, options, next, refuse_again, path.string());
   if (table.skipped_lines() > 0) {
     poses.understood.push_back(skipped_words(table));
   }
@@ -288,12 +289,10 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
              : "its poses have no times (`time-column`), and are taken row by row");
   }
   if (!is_planar) {
-    const auto name = [&](const UnitColumn& column) {
-      return printable(table.columns()[column.index]);
-    };
     poses.understood.push_back(
-        words_about(rules, fmt::format(", columns '{}' to '{}'", name(pose.columns.front()),
-                                       name(pose.columns.back()))));
+        words_about(rules, fmt::format(", columns '{}' to '{}'",
+                                       printable(table.columns()[pose.columns.front().index]),
+                                       printable(table.columns()[pose.columns.back().index]))));
   }
   TableTimes times(table, time.value_or(UnitColumn()));
   std::uint64_t repeated = 0;
@@ -313,7 +312,7 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
       }
       poses.time_s.push_back(time_s);
     }
-    const std::vector<double> v = numbers_in(table, pose);
+    const std::vector<double> v = numbers_in(table, pose.columns);
     if (is_planar) {
       const auto at = [&](std::size_t i) { return rules.units[i].convert(v[i]); };
       poses.T_robot_sensor.push_back(v.empty() ? unknown_pose : Pose{{at(0), at(1)}, at(2)});

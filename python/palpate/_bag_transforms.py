@@ -87,8 +87,6 @@ def _interpolated(log: tuple[Numbers, Numbers], at_s: Numbers, gap_s: float) -> 
     The position is on the line and the rotation on the shorter arc between two rows.
     """
     time_s, rows = log
-    if len(time_s) == 0:
-        return numpy.full((len(at_s), 7), math.nan)
     after = numpy.searchsorted(time_s, at_s).clip(max=len(time_s) - 1)
     before = numpy.where(time_s[after] == at_s, after, (after - 1).clip(min=0))
     step_s = time_s[after] - time_s[before]
@@ -163,9 +161,9 @@ class Transforms:
                 self._keep_chains()
             if edge.static:
                 edge.rows = Rows()
-            if edge.static or self.kept is None or child in self.kept:
-                if row := _row_of(transform.transform):
-                    edge.rows.add(stamp_s(transform.header.stamp), received_s, row)
+            wanted = edge.static or self.kept is None or child in self.kept
+            if wanted and (row := _row_of(transform.transform)):
+                edge.rows.add(stamp_s(transform.header.stamp), received_s, row)
 
     def _keep_chains(self) -> None:
         """Forgets what the wanted chains do not need, now that a frame has a parent."""

@@ -122,10 +122,8 @@ def test_topics_are_listed(log: pathlib.Path) -> None:
         ({"pressure_topic": []}, "pressure_topic: names no topic"),
         ({"tf": "base:array", "pose_field": "pose"}, "pose_field: is of the poses of a topic; give"),
         ({"euler": "vector"}, "euler: is of the poses of a topic; give pose_topic"),
-        ({"pose_topic": "/pose", "euler": "xyz"}, "/pose: its poses are of another form than euler= or matrix= is"),
-        ({"pose_topic": "/plain", "pose_field": "data"}, "/plain: its poses are of 4 numbers; give three, X,Y,THETA"),
-        ({"pose_topic": "/pose", "pose_field": "pose.position,pose.position"},
-         "/pose: its poses are x, y, z and three angles or a rotation vector; give euler='xyz'"),
+        # Before all is read, of which the frames would be refused.
+        ({"pose_topic": "/plain", "pose_field": "data", "truth_tf": "base:head", "object": "cup"}, "are of 4 numbers"),
         ({"tf": "base:array", "truth_tf": "base:cup"}, "truth_tf: needs the object's label"),
         ({"mount": (0, 0, 0, 0, 0, 0)}, "mount: is for poses; give pose_topic or tf"),
         ({"tf": ("base", "array"), "pose_delay": math.nan}, "pose_delay="),
@@ -301,6 +299,7 @@ def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_pa
         assert run(mcap, "--list").status == 130
     for said in ("log: /s: list: is no pose", "log: array:base: turned out of the robot's xy plane: x is"):
         assert _in_flags(said, _flag_parser()) == said, "no flag stands in it"
+    posed = (*flags[:4], "--pose-topic", "/pose")
     unposed = run(mcap, *flags[:4], "-o", tmp_path / "unposed.h5")
     assert "none with a pose, as neither --tf nor --pose-topic is given" in unposed.out
     for arguments, words in (
@@ -314,11 +313,15 @@ def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_pa
         ((mcap, *flags, "-o", tmp_path / "none" / "f.h5"), ": cannot be written; give a file"),
         ((mcap, *flags, "--dead", "auto", "-o", file), "--dead auto: 'auto' is no element"),
         ((mcap, *flags, "--plane", "", "-o", file), "--plane: give auto, or "),
+        ((mcap, "--pressure-topic", "/hand", "--pressure-field", "fingers.taxels", "--array", "2:2:2", "--pose-topic",
+          "/pose", "--pose-field", "pose.position,pose.position", "-o", file),
+         "/pose: its poses are x, y, z and three angles or a rotation vector; give --euler xyz, roll, pitch and yaw"),
+        ((mcap, *posed, "--pose-unit", "m", "-o", file), "--pose-unit m: give mm,rad or"),
         ((mcap, *flags, "--mount", "auto", "-o", file), "--mount auto: give X,Y,Z,ROLL,PITCH,YAW"),
         ((mcap, *flags, "--mount", "", "-o", file), "--mount: give X,Y,Z,ROLL,PITCH,YAW, mm and degrees"),
         ((mcap, *flags, "--array", "2:3:2", "-o", file), "array of 6 elements; correct --array\n"),
         ((mcap, *flags, "--tf", "base:head", "-o", file), ": --tf base:head: no chain of transforms"),
-        ((mcap, "--pressure-topic", "/hand", *flags[2:], "-o", file), "serial, fingers.taxels; name one by --pressure-field\n"),
+        ((mcap, "--pressure-topic", "/hand", *flags[2:], "-o", file), "fingers.taxels; name one by --pressure-field\n"),
     ):
         wrong = run(*arguments)
         assert wrong.status == 2 and words in wrong.err, wrong.err
