@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -217,6 +218,34 @@ PressureColumns axes_of(const CsvTable& table, const std::vector<std::size_t>& c
   return triples;
 }
 
+/// x, y and an angle, or a position and a quaternion, perhaps behind a time.
+TimedPoseColumns columns_without_names(const CsvTable& table, const TableOptions& options) {
+  const std::size_t count = table.columns().size();
+  const bool has_time = count == 4 || count == 8;
+  std::vector<std::size_t> indices(has_time ? count - 1 : count);
+  std::iota(indices.begin(), indices.end(), has_time ? 1 : 0);
+  if (indices.size() != 3 && indices.size() != 7) {
+    table.refuse(
+        "{} columns without names; write x, y, theta or tx, ty, tz, qx, qy, qz, qw, with or "
+        "without a time before them, or add a header",
+        count);
+  }
+  const PoseForm form = indices.size() == 3 ? PoseForm::planar : PoseForm::quaternion;
+  return {has_time ? std::optional(unit_column(table, 0, time_units, options)) : std::nullopt,
+          pose_columns(table, form, indices, options)};
+}
+
+/// True where the first column stands alone before the pose and counts or labels nothing.
+bool may_be_time(const CsvTable& table, const PoseColumns& pose, const TableOptions& options) {
+  constexpr std::string_view others = "frame touch row index seq n id label object";
+  const std::string& name = table.columns()[0];
+  const auto is_name = [&](std::string_view other) { return alike(other, name); };
+  return std::ranges::min(pose.columns, {}, &UnitColumn::index).index == 1 && !name.empty() &&
+         std::ranges::none_of(split_text(others, ' '), is_name) &&
+         std::ranges::none_of(conditions(options), is_name,
+                              &std::pair<std::string, std::string>::first);
+}
+
 }  // namespace
 
 std::vector<std::size_t> choose_columns(const CsvTable& table, const std::string& text,
@@ -283,6 +312,25 @@ double reading_in(const CsvTable& table, const std::vector<std::size_t>& axes, b
     sum += part * part;
   }
   return std::sqrt(sum);
+}
+
+TimedPoseColumns find_columns(const CsvTable& table, const TableOptions& options) {
+  PoseColumns pose = find_pose(table, options);
+  if (pose.columns.empty() && !table.has_header()) {
+    return columns_without_names(table, options);
+  }
+  if (pose.columns.empty()) {
+    table.refuse_columns("has no columns 'x', 'y' and 'theta'; rename its columns{}",
+                         options.may_name_poses
+                             ? ", or name them by `pose-columns`: X,Y,THETA, or in space "
+                               "X,Y,Z,ROLL,PITCH,YAW or TX,TY,TZ,QX,QY,QZ,QW"
+                             : "");
+  }
+  std::optional<UnitColumn> time = find_time(table, options);
+  if (!time && options.needs_times && may_be_time(table, pose, options)) {
+    time = unit_column(table, 0, time_units, options);
+  }
+  return {time, std::move(pose)};
 }
 
 }  // namespace palpate

@@ -1,10 +1,12 @@
 #include "io/pose_table.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <numbers>
-#include <numeric>
 #include <span>
 #include <utility>
 
@@ -27,56 +29,138 @@ std::size_t axis_of(char letter) {
   return static_cast<std::size_t>(std::tolower(static_cast<unsigned char>(letter)) - 'x');
 }
 
-struct TableColumns {
-  std::optional<UnitColumn> time;
-  PoseColumns pose;
+/// The pose that 12 or 16 numbers of a homogeneous matrix tell, [R t] or [R t; 0 1]; none where it
+/// is no rotation.
+std::optional<SpatialPose> pose_of_matrix(std::span<const double> numbers, const Unit& length,
+                                          bool by_columns) {
+  if (numbers.empty()) {
+    return {};
+  }
+  const std::size_t rows = numbers.size() / 4;  // of four columns
+  const auto at = [&](std::size_t row, std::size_t column) {
+    return by_columns ? numbers[column * rows + row] : numbers[row * 4 + column];
+  };
+  glm::dmat3 r;
+  SpatialPose pose;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      r[column][row] = at(static_cast<std::size_t>(row), static_cast<std::size_t>(column));
+    }
+    pose.translation_mm[row] = length.convert(at(static_cast<std::size_t>(row), 3));
+  }
+  bool is_one = std::abs(glm::determinant(r) - 1.0) <= rounding;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      is_one = is_one && std::abs(glm::dot(r[i], r[j]) - (i == j ? 1.0 : 0.0)) <= rounding;
+    }
+  }
+  for (std::size_t column = 0; column < 4 && rows == 4; ++column) {
+    is_one = is_one && std::abs(at(3, column) - (column == 3 ? 1.0 : 0.0)) <= 1e-6;
+  }
+  pose.rotation = glm::normalize(glm::quat_cast(r));
+  return is_one ? std::optional(pose) : std::nullopt;
+}
+
+/// How rows of numbers tell poses in space.
+struct PoseRules {
+  PoseForm form;
+  std::vector<Unit> units;   ///< of each number, of matrices the first
+  std::string axes = "xyz";  ///< of three angles
+  bool by_columns = false;   ///< of matrices
 };
 
-/// x, y and an angle, or a position and a quaternion, perhaps behind a time.
-TableColumns columns_without_names(const CsvTable& table, const TableOptions& options) {
-  const std::size_t count = table.columns().size();
-  const bool has_time = count == 4 || count == 8;
-  std::vector<std::size_t> indices(has_time ? count - 1 : count);
-  std::iota(indices.begin(), indices.end(), has_time ? 1 : 0);
-  if (indices.size() != 3 && indices.size() != 7) {
-    table.refuse(
-        "{} columns without names; write x, y, theta or tx, ty, tz, qx, qy, qz, qw, with or "
-        "without a time before them, or add a header",
-        count);
+/// Goes on to the next row, which is empty where it is not known; false after the last.
+using NextRow = std::function<bool(std::vector<double>& row)>;
+/// Refuses the row that is read, for this reason.
+using RefuseRow = std::function<void(const std::string& why)>;
+
+/// Completes the rules by the options, and where these do not say how matrices are written, by the
+/// first row that only one of the two ways makes a pose.
+void complete(PoseRules& rules, const TableOptions& options, const NextRow& next,
+              const RefuseRow& refuse, const std::string& place) {
+  const bool is_matrix = rules.form == PoseForm::matrix;
+  if ((!options.euler.empty() && !is_of_angles(rules.form)) ||
+      (!options.matrix.empty() && !is_matrix)) {
+    palpate::refuse(place,
+                    "its poses are of another form than `euler` or `matrix` is for; leave it out, "
+                    "or name other columns or fields");
   }
-  const PoseForm form = indices.size() == 3 ? PoseForm::planar : PoseForm::quaternion;
-  return {has_time ? std::optional(unit_column(table, 0, time_units, options)) : std::nullopt,
-          pose_columns(table, form, indices, options)};
+  rules.axes = options.euler.empty() ? "xyz" : options.euler;
+  rules.by_columns = options.matrix == "columns";
+  bool is_told = !is_matrix || !options.matrix.empty();
+  for (std::vector<double> row; !is_told;) {
+    if (!next(row)) {
+      palpate::refuse(place,
+                      "its matrices may be written by columns or by rows; give `matrix columns` or "
+                      "`matrix rows`");
+    }
+    rules.by_columns = pose_of_matrix(row, rules.units[0], true).has_value();
+    is_told = rules.by_columns != pose_of_matrix(row, rules.units[0], false).has_value();
+    if (!is_told && !row.empty() && !rules.by_columns) {
+      refuse(
+          "the numbers are no rotation and position, read by columns or by rows; give the 12 or "
+          "16 numbers of the matrix in its order");
+    }
+  }
 }
 
-/// True where the first column stands alone before the pose and counts or labels nothing.
-bool may_be_time(const CsvTable& table, const PoseColumns& pose, const TableOptions& options) {
-  constexpr std::string_view others = "frame touch row index seq n id label object";
-  const std::string& name = table.columns()[0];
-  const auto is_name = [&](std::string_view other) { return alike(other, name); };
-  return std::ranges::min(pose.columns, {}, &UnitColumn::index).index == 1 && !name.empty() &&
-         std::ranges::none_of(split_text(others, ' '), is_name) &&
-         std::ranges::none_of(conditions(options), is_name,
-                              &std::pair<std::string, std::string>::first);
+/// The pose of a row; none where the row is empty, or its quaternion of zeros.
+std::optional<SpatialPose> spatial_pose(const PoseRules& rules, std::span<const double> row,
+                                        const RefuseRow& refuse) {
+  if (row.empty()) {
+    return {};
+  }
+  if (rules.form == PoseForm::matrix) {
+    const auto pose = pose_of_matrix(row, rules.units[0], rules.by_columns);
+    if (!pose) {
+      refuse(fmt::format(
+          "the numbers are no rotation and position, read by {}; correct them, or "
+          "give `matrix {}`",
+          rules.by_columns ? "columns" : "rows", rules.by_columns ? "rows" : "columns"));
+    }
+    return pose;
+  }
+  std::array<double, 7> v{};
+  std::ranges::transform(rules.units, row, v.begin(), &Unit::convert);
+  if (rules.form == PoseForm::planar) {
+    return SpatialPose{{v[0], v[1], 0.0}, rotation_of_vector({0.0, 0.0, v[2]})};
+  }
+  SpatialPose pose{{v[0], v[1], v[2]}};
+  if (rules.form == PoseForm::euler) {
+    pose.rotation = rotation_of_angles(rules.axes, std::span(v).subspan(3, 3));
+  } else if (rules.form == PoseForm::rotation_vector) {
+    pose.rotation = rotation_of_vector({v[3], v[4], v[5]});
+  } else {
+    const glm::dquat rotation(v[6], v[3], v[4], v[5]);
+    const double length = glm::length(rotation);
+    if (length == 0.0) {
+      return {};
+    }
+    if (std::abs(length - 1.0) > rounding) {
+      refuse(
+          fmt::format("the quaternion's length is {:.4g}, so that it is no rotation; write qx, "
+                      "qy, qz and qw in this order, of length 1",
+                      length));
+    }
+    pose.rotation = rotation / length;
+  }
+  return pose;
 }
 
-TableColumns find_columns(const CsvTable& table, const TableOptions& options) {
-  PoseColumns pose = find_pose(table, options);
-  if (pose.columns.empty() && !table.has_header()) {
-    return columns_without_names(table, options);
+/// What the rows of these columns are, in a sentence.
+std::string words_about(const PoseRules& rules, const std::string& columns = "") {
+  std::string form = "x, y, z and a quaternion x, y, z, w";
+  if (rules.form == PoseForm::euler) {
+    form = fmt::format("x, y, z and angles about the {} axes {} one after another (`euler`)",
+                       rules.axes[0] >= 'x' ? "fixed" : "moving", rules.axes);
+  } else if (rules.form == PoseForm::rotation_vector) {
+    form = "x, y, z and a rotation vector";
+  } else if (rules.form == PoseForm::matrix) {
+    form = fmt::format("matrices written by {} (`matrix`)", rules.by_columns ? "columns" : "rows");
   }
-  if (pose.columns.empty()) {
-    table.refuse_columns("has no columns 'x', 'y' and 'theta'; rename its columns{}",
-                         options.may_name_poses
-                             ? ", or name them by `pose-columns`: X,Y,THETA, or in space "
-                               "X,Y,Z,ROLL,PITCH,YAW or TX,TY,TZ,QX,QY,QZ,QW"
-                             : "");
-  }
-  std::optional<UnitColumn> time = find_time(table, options);
-  if (!time && options.needs_times && may_be_time(table, pose, options)) {
-    time = unit_column(table, 0, time_units, options);
-  }
-  return {time, std::move(pose)};
+  return fmt::format(
+      "its poses are {}{}, in {}{}", form, columns, rules.units.front().name,
+      is_of_angles(rules.form) ? fmt::format(" and {}", rules.units.back().name) : "");
 }
 
 /// The columns of these names that are no part of the pose.
@@ -109,9 +193,8 @@ void require_flat(const CsvTable& table, std::span<const UnitColumn> rotations) 
   }
 }
 
-/// The numbers of the columns in their units' mm and rad; none where all cells are empty.
-std::optional<std::vector<double>> numbers_in(const CsvTable& table,
-                                              std::span<const UnitColumn> columns) {
+/// The numbers of the columns; none where all cells are empty.
+std::vector<double> numbers_in(const CsvTable& table, std::span<const UnitColumn> columns) {
   std::vector<double> values;
   std::vector<std::string> empty;
   for (const UnitColumn& column : columns) {
@@ -119,8 +202,8 @@ std::optional<std::vector<double>> numbers_in(const CsvTable& table,
     if (!number) {
       empty.push_back(fmt::format("'{}'", printable(table.columns()[column.index])));
     }
-    values.push_back(column.unit.convert(number.value_or(0.0)));
-    if (std::abs(values.back()) > farthest_mm) {  // or as many rad
+    values.push_back(number.value_or(0.0));
+    if (std::abs(column.unit.convert(values.back())) > farthest_mm) {  // or as many rad
       table.refuse(
           "column '{}': {} {} is further than any robot gets; check the number and its "
           "unit",
@@ -135,129 +218,6 @@ std::optional<std::vector<double>> numbers_in(const CsvTable& table,
                  fmt::format("{}", fmt::join(empty, ", ")), columns.size());
   }
   return values;
-}
-
-/// None where the quaternion is of zeros.
-std::optional<SpatialPose> pose_of_quaternion(const CsvTable& table, std::span<const double> v) {
-  const glm::dquat rotation(v[6], v[3], v[4], v[5]);
-  const double length = glm::length(rotation);
-  if (length == 0.0) {
-    return {};
-  }
-  if (std::abs(length - 1.0) > rounding) {
-    table.refuse(
-        "the quaternion's length is {:.4g}, so that it is no rotation; write qx, qy, qz "
-        "and qw in this order, of length 1",
-        length);
-  }
-  return SpatialPose{{v[0], v[1], v[2]}, rotation / length};
-}
-
-/// The pose that a matrix tells; none where the numbers are no rotation and position.
-/// @param in_mm numbers in the unit of the position, which is not that of the rotation
-std::optional<SpatialPose> matrix_of(const PoseColumns& columns, std::span<const double> in_mm,
-                                     bool by_columns) {
-  const Unit& unit = columns.columns.front().unit;
-  std::vector<double> numbers(in_mm.begin(), in_mm.end());
-  for (double& number : numbers) {
-    number *= unit.divisor / unit.multiplier;
-  }
-  auto pose = pose_of_matrix(numbers, by_columns);
-  if (pose) {
-    pose->translation_mm *= unit.multiplier / unit.divisor;
-  }
-  return pose;
-}
-
-/// Whether matrices are written by columns, by the first row that only one of the two ways makes a
-/// pose.
-bool is_by_columns(const std::filesystem::path& path, const PoseColumns& columns,
-                   const TableOptions& options) {
-  if (columns.form != PoseForm::matrix || !options.matrix.empty()) {
-    return options.matrix == "columns";
-  }
-  CsvTable table = open_table(path, options);
-  while (table.next()) {
-    const auto numbers = numbers_in(table, columns.columns);
-    const bool by_columns = numbers && matrix_of(columns, *numbers, true);
-    const bool by_rows = numbers && matrix_of(columns, *numbers, false);
-    if (by_columns != by_rows) {
-      return by_columns;
-    }
-    if (numbers && !by_columns) {
-      table.refuse(
-          "the numbers are no rotation and position, read by columns or by rows; name the 12 or "
-          "16 columns of the matrix in its order");
-    }
-  }
-  refuse(path,
-         "its matrices may be written by columns or by rows; give `matrix columns` or "
-         "`matrix rows`");
-}
-
-/// How the rotations of poses in space are written.
-struct RotationRules {
-  std::string axes;  ///< of three angles
-  bool by_columns;   ///< of matrices
-};
-
-/// The row's pose in space; none where its cells are empty.
-std::optional<SpatialPose> spatial_pose(const CsvTable& table, const PoseColumns& columns,
-                                        const RotationRules& rules) {
-  const auto numbers = numbers_in(table, columns.columns);
-  if (!numbers) {
-    return {};
-  }
-  const std::vector<double>& v = *numbers;
-  switch (columns.form) {
-    case PoseForm::euler:
-      return SpatialPose{{v[0], v[1], v[2]},
-                         rotation_of_angles(rules.axes, std::span(v).subspan(3))};
-    case PoseForm::rotation_vector:
-      return SpatialPose{{v[0], v[1], v[2]}, rotation_of_vector({v[3], v[4], v[5]})};
-    case PoseForm::matrix: {
-      const auto pose = matrix_of(columns, v, rules.by_columns);
-      if (!pose) {
-        table.refuse(
-            "the numbers are no rotation and position, read by {}; correct them, or give "
-            "`matrix {}`",
-            rules.by_columns ? "columns" : "rows", rules.by_columns ? "rows" : "columns");
-      }
-      return pose;
-    }
-    default:
-      return pose_of_quaternion(table, v);
-  }
-}
-
-/// What the columns of poses in space are, in a sentence.
-std::string words_about(const CsvTable& table, const PoseColumns& columns,
-                        const RotationRules& rules) {
-  std::string form;
-  switch (columns.form) {
-    case PoseForm::euler:
-      form = fmt::format(
-          "its poses are x, y, z and angles about the {} axes {} one after another (`euler`)",
-          rules.axes[0] >= 'x' ? "fixed" : "moving", rules.axes);
-      break;
-    case PoseForm::rotation_vector:
-      form = "its poses are x, y, z and a rotation vector";
-      break;
-    case PoseForm::matrix:
-      form = fmt::format("its poses are matrices written by {} (`matrix`)",
-                         rules.by_columns ? "columns" : "rows");
-      break;
-    default:
-      form = "its poses are x, y, z and a quaternion x, y, z, w";
-      break;
-  }
-  const UnitColumn& first = columns.columns.front();
-  const UnitColumn& last = columns.columns.back();
-  const bool is_matrix = columns.form == PoseForm::matrix;
-  return fmt::format(
-      "{}, columns '{}' to '{}', in {}{}", form, printable(table.columns()[first.index]),
-      printable(table.columns()[last.index]), first.unit.name,
-      is_matrix || last.unit.name.empty() ? "" : fmt::format(" and {}", last.unit.name));
 }
 
 }  // namespace
@@ -283,46 +243,14 @@ glm::dquat rotation_of_vector(const glm::dvec3& v) {
   return angle == 0.0 ? glm::dquat(1.0, 0.0, 0.0, 0.0) : glm::angleAxis(angle, v / angle);
 }
 
-std::optional<SpatialPose> pose_of_matrix(std::span<const double> numbers, bool by_columns) {
-  const std::size_t rows = numbers.size() / 4;  // of four columns
-  const auto at = [&](std::size_t row, std::size_t column) {
-    return by_columns ? numbers[column * rows + row] : numbers[row * 4 + column];
-  };
-  glm::dmat3 r;
-  SpatialPose pose;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      r[column][row] = at(static_cast<std::size_t>(row), static_cast<std::size_t>(column));
-    }
-    pose.translation_mm[row] = at(static_cast<std::size_t>(row), 3);
-  }
-  bool is_one = std::abs(glm::determinant(r) - 1.0) <= rounding;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      is_one = is_one && std::abs(glm::dot(r[i], r[j]) - (i == j ? 1.0 : 0.0)) <= rounding;
-    }
-  }
-  for (std::size_t column = 0; column < 4 && rows == 4; ++column) {
-    is_one = is_one && std::abs(at(3, column) - (column == 3 ? 1.0 : 0.0)) <= 1e-6;
-  }
-  pose.rotation = glm::normalize(glm::quat_cast(r));
-  return is_one ? std::optional(pose) : std::nullopt;
-}
-
 PoseTable read_poses(const std::filesystem::path& path, const TableOptions& options,
                      bool with_times) {
   CsvTable table = open_table(path, options);
   const auto [time, pose] = find_columns(table, options);
   PoseTable poses;
   const bool is_planar = pose.form == PoseForm::planar;
-  const bool has_angles = pose.form == PoseForm::euler || pose.form == PoseForm::rotation_vector;
-  if ((!options.euler.empty() && !has_angles) ||
-      (!options.matrix.empty() && pose.form != PoseForm::matrix)) {
-    refuse(path,
-           "its poses are of another form than `euler` or `matrix` is for; leave it out, or "
-           "name other columns by `pose-columns`");
-  }
-  const Unit angle_unit = is_planar || has_angles ? pose.columns.back().unit : angle_units[0];
+  const bool has_angles = is_planar || is_of_angles(pose.form);
+  const Unit angle_unit = has_angles ? pose.columns.back().unit : angle_units[0];
   poses.units = {pose.columns[0].unit, pose.columns[1].unit,
                  given_unit(options, angle_units).value_or(angle_unit)};
   poses.assumed_units = assumed_words(table, pose.columns);
@@ -337,8 +265,19 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
           printable(table.columns()[height.index])));
     }
   }
-  const RotationRules rules{options.euler.empty() ? "xyz" : options.euler,
-                            is_by_columns(path, pose, options)};
+  PoseRules rules{pose.form, {}};
+  std::ranges::transform(pose.columns, std::back_inserter(rules.units), &UnitColumn::unit);
+  std::optional<CsvTable> again;
+  const NextRow next = [&](std::vector<double>& row) {
+    if (!again) {
+      again.emplace(open_table(path, options));
+    }
+    const bool has_row = again->next();
+    row = has_row ? numbers_in(*again, pose.columns) : std::vector<double>();
+    return has_row;
+  };
+  const auto refuse_again = [&](const std::string& why) { again->refuse("{}", why); };
+  complete(rules, options, next, refuse_again, path.string());
   if (table.skipped_lines() > 0) {
     poses.understood.push_back(skipped_words(table));
   }
@@ -350,11 +289,15 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
              : "its poses have no times (`time-column`), and are taken row by row");
   }
   if (!is_planar) {
-    poses.understood.push_back(words_about(table, pose, rules));
+    poses.understood.push_back(
+        words_about(rules, fmt::format(", columns '{}' to '{}'",
+                                       printable(table.columns()[pose.columns.front().index]),
+                                       printable(table.columns()[pose.columns.back().index]))));
   }
   TableTimes times(table, time.value_or(UnitColumn()));
   std::uint64_t repeated = 0;
   std::uint64_t zeros = 0;
+  const RefuseRow refuse_row = [&](const std::string& why) { table.refuse("{}", why); };
   while (table.next()) {
     require_flat(table, rotations);
     if (time && with_times) {
@@ -369,13 +312,13 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
       }
       poses.time_s.push_back(time_s);
     }
+    const std::vector<double> v = numbers_in(table, pose.columns);
     if (is_planar) {
-      const auto numbers = numbers_in(table, pose.columns);
-      poses.T_robot_sensor.push_back(numbers ? Pose{{(*numbers)[0], (*numbers)[1]}, (*numbers)[2]}
-                                             : unknown_pose);
+      const auto at = [&](std::size_t i) { return rules.units[i].convert(v[i]); };
+      poses.T_robot_sensor.push_back(v.empty() ? unknown_pose : Pose{{at(0), at(1)}, at(2)});
     } else {
-      poses.spatial.push_back(spatial_pose(table, pose, rules));
-      zeros += !poses.spatial.back() && table.number(pose.columns.front().index) ? 1 : 0;
+      poses.spatial.push_back(spatial_pose(rules, v, refuse_row));
+      zeros += !v.empty() && !poses.spatial.back() ? 1 : 0;
     }
   }
   if (poses.T_robot_sensor.empty() && poses.spatial.empty()) {
@@ -390,6 +333,49 @@ PoseTable read_poses(const std::filesystem::path& path, const TableOptions& opti
         fmt::format("{} of its poses are unknown, as their quaternion is of zeros", zeros));
   }
   poses.steps = std::move(times.steps);
+  return poses;
+}
+
+PoseForm form_of_rows(const std::string& name, std::size_t width, const TableOptions& options) {
+  const std::optional<PoseForm> form = form_of(width);
+  if (!form) {
+    refuse(name, "its poses are of {} numbers; {}", width, forms_of_poses);
+  }
+  if (form == PoseForm::euler && options.euler.empty()) {
+    refuse(name,
+           "its poses are x, y, z and three angles or a rotation vector; give `euler xyz`, roll, "
+           "pitch and yaw about fixed axes, or other axes, or `euler vector`");
+  }
+  return options.euler == "vector" ? PoseForm::rotation_vector : *form;
+}
+
+PoseTable poses_of_rows(const std::string& name, std::span<const double> numbers, std::size_t width,
+                        const TableOptions& options) {
+  const PoseForm form = form_of_rows(name, width, options);
+  PoseRules rules{form, units_of(form, options)};
+  std::size_t end = 0;  // of the row
+  const NextRow next = [&](std::vector<double>& row) {
+    if (end == numbers.size()) {
+      return false;
+    }
+    const auto part = numbers.subspan(end, width);
+    end += width;
+    const bool known = std::ranges::all_of(part, [](double v) { return std::isfinite(v); });
+    row.assign(part.begin(), known ? part.end() : part.begin());
+    return true;
+  };
+  const RefuseRow refuse_row = [&](const std::string& why) {
+    refuse(fmt::format("{}[{}]", name, end / width - 1), "{}", why);
+  };
+  complete(rules, options, next, refuse_row, name);
+  PoseTable poses;
+  end = 0;
+  for (std::vector<double> row; next(row);) {
+    poses.spatial.push_back(spatial_pose(rules, row, refuse_row));
+  }
+  if (is_of_angles(form) || form == PoseForm::matrix) {
+    poses.understood = {words_about(rules)};
+  }
   return poses;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -34,11 +35,6 @@ glm::dquat rotation_of_angles(std::string_view axes, std::span<const double> rad
 /// The rotation about a vector, by its length in rad.
 glm::dquat rotation_of_vector(const glm::dvec3& v);
 
-/// The pose that 12 or 16 numbers of a homogeneous matrix tell, [R t] or [R t; 0 1], its position
-/// in the unit of the numbers; none where it is no rotation.
-/// @param by_columns how the matrix is written
-std::optional<SpatialPose> pose_of_matrix(std::span<const double> numbers, bool by_columns);
-
 /// Poses T_robot_sensor, row by row.
 struct PoseTable {
   std::vector<double> time_s;        ///< [n], or empty
@@ -63,5 +59,17 @@ struct PoseTable {
 /// pitch, rx or ry turns an array of x, y and theta out of the plane by more than 3 degrees
 PoseTable read_poses(const std::filesystem::path& path, const TableOptions& options,
                      bool with_times = true);
+
+/// The form of poses in rows of so many numbers, which have no names to tell it.
+/// @param name of the rows, for messages
+/// @throws Error where they are no pose, or the options do not say what six numbers are
+PoseForm form_of_rows(const std::string& name, std::size_t width, const TableOptions& options);
+
+/// Poses of rows of `width` numbers: x, y and an angle, which lie in the xy plane; x, y, z and the
+/// angles or the vector that `euler` says; a position and a quaternion x, y, z, w; or a matrix. In
+/// the units of `pose_unit`, else mm and rad; unknown where a number is not finite.
+/// @throws Error as form_of_rows(), and naming the row that is no pose
+PoseTable poses_of_rows(const std::string& name, std::span<const double> numbers, std::size_t width,
+                        const TableOptions& options);
 
 }  // namespace palpate

@@ -138,25 +138,16 @@ PoseColumns usual_pose(const CsvTable& table, const TableOptions& options) {
 }
 
 PoseColumns named_pose(const CsvTable& table, const TableOptions& options) {
-  constexpr std::pair<std::size_t, PoseForm> forms[] = {{3, PoseForm::planar},
-                                                        {6, PoseForm::euler},
-                                                        {7, PoseForm::quaternion},
-                                                        {12, PoseForm::matrix},
-                                                        {16, PoseForm::matrix}};
   const auto time = find_time(table, options);
   const std::vector<std::size_t> taken(time ? 1 : 0, time ? time->index : 0);
   const std::vector<std::size_t> chosen =
       choose_columns(table, options.pose_columns, taken, "pose-columns");
-  const auto found =
-      std::ranges::find(forms, chosen.size(), &std::pair<std::size_t, PoseForm>::first);
-  if (found == std::end(forms)) {
-    table.refuse_columns(
-        "`pose-columns {}` names {} columns; give three, X,Y,THETA, or of poses in space six "
-        "(X,Y,Z,ROLL,PITCH,YAW, or a rotation vector), seven (TX,TY,TZ,QX,QY,QZ,QW), or the 12 "
-        "or 16 numbers of a matrix",
-        options.pose_columns, chosen.size());
+  const std::optional<PoseForm> found = form_of(chosen.size());
+  if (!found) {
+    table.refuse_columns("`pose-columns {}` names {} columns; {}", options.pose_columns,
+                         chosen.size(), forms_of_poses);
   }
-  PoseForm form = found->second;
+  PoseForm form = *found;
   if (form == PoseForm::euler) {
     // UR's names and rx, ry, rz say what they are; other angles are roll, pitch and yaw.
     const std::string_view name = table.columns()[chosen[3]];
@@ -198,6 +189,28 @@ bool are_axes(std::string_view axes) {
 }
 
 }  // namespace
+
+bool is_of_angles(PoseForm form) {
+  return form == PoseForm::euler || form == PoseForm::rotation_vector;
+}
+
+std::vector<Unit> units_of(PoseForm form, const TableOptions& options) {
+  std::vector<Unit> units;
+  for (const Quantity& quantity : quantities_of(form)) {
+    units.push_back(given_unit(options, quantity.units).value_or(quantity.units.front()));
+  }
+  return units;
+}
+
+std::optional<PoseForm> form_of(std::size_t numbers) {
+  constexpr std::pair<std::size_t, PoseForm> forms[] = {{3, PoseForm::planar},
+                                                        {6, PoseForm::euler},
+                                                        {7, PoseForm::quaternion},
+                                                        {12, PoseForm::matrix},
+                                                        {16, PoseForm::matrix}};
+  const auto found = std::ranges::find(forms, numbers, &std::pair<std::size_t, PoseForm>::first);
+  return found == std::end(forms) ? std::nullopt : std::optional(found->second);
+}
 
 void validate(const TableOptions& options) {
   const auto require_one_of = [](const char* option, const std::string& value,
@@ -338,8 +351,7 @@ PoseColumns pose_columns(const CsvTable& table, PoseForm form,
 PoseColumns find_pose(const CsvTable& table, const TableOptions& options) {
   PoseColumns pose =
       options.pose_columns.empty() ? usual_pose(table, options) : named_pose(table, options);
-  const bool has_angles = pose.form == PoseForm::euler || pose.form == PoseForm::rotation_vector;
-  if (has_angles && !options.euler.empty()) {
+  if (is_of_angles(pose.form) && !options.euler.empty()) {
     pose.form = options.euler == "vector" ? PoseForm::rotation_vector : PoseForm::euler;
   }
   if (pose.form == PoseForm::quaternion) {

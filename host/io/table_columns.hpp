@@ -108,6 +108,16 @@ std::optional<UnitColumn> find_time(const CsvTable& table, const TableOptions& o
 /// rotation.
 enum class PoseForm { planar, quaternion, euler, rotation_vector, matrix };
 
+/// True where the last three numbers are angles or a rotation vector.
+bool is_of_angles(PoseForm form);
+/// The form of a pose of so many numbers, euler for both forms of six; none of another number.
+std::optional<PoseForm> form_of(std::size_t numbers);
+/// The unit of each number by the options, else the first of its units.
+std::vector<Unit> units_of(PoseForm form, const TableOptions& options);
+inline constexpr std::string_view forms_of_poses =
+    "give three, X,Y,THETA, or of poses in space six (X,Y,Z,ROLL,PITCH,YAW, or a rotation vector), "
+    "seven (TX,TY,TZ,QX,QY,QZ,QW), or the 12 or 16 numbers of a matrix";
+
 struct PoseColumns {
   PoseForm form = PoseForm::planar;
   std::vector<UnitColumn> columns;  ///< in the order of the form
@@ -121,6 +131,11 @@ PoseColumns pose_columns(const CsvTable& table, PoseForm form,
 /// no columns where there are none.
 /// @throws Error where the options name so many that they are no pose
 PoseColumns find_pose(const CsvTable& table, const TableOptions& options);
+
+using TimedPoseColumns = std::pair<std::optional<UnitColumn>, PoseColumns>;
+/// The times, and as find_pose() the poses, of a table of poses, which may have no names.
+/// @throws Error where the table has no pose
+TimedPoseColumns find_columns(const CsvTable& table, const TableOptions& options);
 
 /// The columns that a text names, in its order: names, or numbers counted from 1; FIRST:LAST;
 /// START::STEP, every STEP-th from START on; patterns in which `*` is any text and `{n}` a number,

@@ -91,7 +91,8 @@ Truth truth_of(const std::string& text, const std::array<Unit, 3>& units) {
   return {label, T_object_robot};
 }
 
-void check_numbers(const ImportOptions& options) {
+void check(const ImportOptions& options) {
+  validate(options);
   const auto require = [](bool holds, const std::string& option, const std::string& remedy) {
     if (!holds) {
       refuse(fmt::format("`{}`", option), "{}", remedy);
@@ -218,8 +219,7 @@ ImportedRecording recording_of(const ImportOptions& options, Recording array, Im
 }  // namespace
 
 ImportedRecording import_tables(const ImportOptions& options) {
-  validate(options);
-  check_numbers(options);
+  check(options);
   Recording array = import_array(options);
   const bool one_file = in_one_file(options);
   const auto require_column = [&](const std::string& option, const std::string& name) {
@@ -281,13 +281,16 @@ ImportedRecording import_tables(const ImportOptions& options) {
   return imported;
 }
 
-void require_sound(const ImportOptions& options) {
-  check_numbers(options);
+void require_sound(const ImportOptions& options, std::size_t pose_numbers) {
+  check(options);
   import_array(options);
+  if (pose_numbers > 0) {
+    form_of_rows(options.poses, pose_numbers, options);
+  }
 }
 
 ImportedRecording import_rows(const ImportOptions& options, ImportRows rows) {
-  check_numbers(options);
+  check(options);
   Recording array = import_array(options);
   if (array.elements_mm.size() != rows.elements) {
     refuse(options.pressures,

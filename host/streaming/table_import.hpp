@@ -68,8 +68,8 @@ struct ImportRows {
   std::size_t elements = 0;                   ///< of a row of pressures
 };
 /// Throws Error where a number among the options makes no sense, or the array cannot be read:
-/// before a program reads rows elsewhere.
-void require_sound(const ImportOptions& options);
+/// before a program reads rows elsewhere, or when it knows of how many numbers its poses are.
+void require_sound(const ImportOptions& options, std::size_t pose_numbers = 0);
 /// As import_tables() of tables that hold this. The options' files name what the rows came from;
 /// poses without times are by the clock of the frames.
 /// @throws Error as import_tables(), and where the array is of other elements

@@ -70,21 +70,6 @@ Imported import_tables_python(const ImportOptions& options) {
   return returned(run([&] { return import_tables(options); }), options);
 }
 
-/// None where a number is NaN, or the quaternion is of zeros, as in a table.
-std::optional<SpatialPose> spatial_pose(std::span<const double> row, const std::string& place) {
-  const glm::dquat rotation(row[6], row[3], row[4], row[5]);
-  const double length = glm::length(rotation);
-  if (length == 0.0 ||
-      std::ranges::any_of(row, [](double number) { return !std::isfinite(number); })) {
-    return {};
-  }
-  if (std::abs(length - 1.0) > 1e-2) {
-    refuse(place, "the quaternion's length is {:.4g}, so that it is no rotation; give x, y, z, w",
-           length);
-  }
-  return SpatialPose{{row[0], row[1], row[2]}, rotation / length};
-}
-
 /// Readings [n, e], or of a grid [n, rows, columns]; of one that is read column by column [n,
 /// columns, rows].
 Floats readings_of(ArrayReader& reader, const ArrayLike& given, const ImportOptions& options) {
@@ -115,15 +100,21 @@ std::vector<ClockStep> steps_in(const std::vector<double>& time_s, const char* n
   return steps;
 }
 
-std::optional<std::array<double, 7>> row_of_matrix(const std::vector<double>& numbers) {
-  for (const bool by_columns : {true, false}) {
-    if (const auto pose = pose_of_matrix(numbers, by_columns)) {
-      const glm::dvec3 p = 1e3 * pose->translation_mm;
-      const glm::dquat& q = pose->rotation;
-      return std::array{p.x, p.y, p.z, q.x, q.y, q.z, q.w};
+/// Gives poses their times; of one time the first is kept.
+void keep_first_of_times(const std::vector<double>& time_s, PoseTable& poses) {
+  std::vector<std::optional<SpatialPose>> kept;
+  for (std::size_t i = 0; i < time_s.size(); ++i) {
+    if (poses.time_s.empty() || time_s[i] != poses.time_s.back()) {
+      poses.time_s.push_back(time_s[i]);
+      kept.push_back(poses.spatial[i]);
     }
   }
-  return {};
+  if (const std::size_t repeated = time_s.size() - kept.size(); repeated > 0) {
+    poses.understood.push_back(fmt::format(
+        "{} of its rows repeat the time of the row before, whose pose is kept", repeated));
+  }
+  poses.spatial = std::move(kept);
+  poses.steps = steps_in(poses.time_s, "pose_time_s");
 }
 
 Imported import_frames(const ImportOptions& options, const ArrayLike& pressures,
@@ -140,28 +131,15 @@ Imported import_frames(const ImportOptions& options, const ArrayLike& pressures,
     rows.pressures.steps = steps_in(rows.pressures.time_s, "time_s");
   }
   if (poses) {
-    rows.poses.emplace();
-    std::vector<double>& kept_s = rows.poses->time_s;
-    const Floats all = reader.floats(*poses, "poses", {"m", "7"});
-    const bool timed = nb::cast<int>(call("numpy", "size", pose_time_s)) > 0;
-    const Floats times = timed ? reader.floats(pose_time_s, "pose_time_s", {"m"}) : Floats();
-    for (std::size_t i = 0; i < all.shape[0]; ++i) {
-      if (timed && !kept_s.empty() && times.values()[i] == kept_s.back()) {
-        continue;
-      }
-      kept_s.insert(kept_s.end(), timed ? 1 : 0, timed ? times.values()[i] : 0.0);
-      rows.poses->spatial.push_back(
-          spatial_pose(all.values().subspan(7 * i, 7), fmt::format("{}[{}]", options.poses, i)));
+    const Floats all = reader.floats(*poses, "poses", {"m", "3|6|7|12|16"});
+    rows.poses = poses_of_rows(options.poses, all.values(), all.shape[1], options);
+    if (nb::cast<int>(call("numpy", "size", pose_time_s)) > 0) {
+      keep_first_of_times(reader.floats(pose_time_s, "pose_time_s", {"m"}).copied(), *rows.poses);
     }
-    if (const std::size_t repeated = all.shape[0] - rows.poses->spatial.size(); repeated > 0) {
-      rows.poses->understood.push_back(fmt::format(
-          "{} of its rows repeat the time of the row before, whose pose is kept", repeated));
-    }
-    rows.poses->steps = steps_in(kept_s, "pose_time_s");
   }
   if (object_pose) {
     const Floats row = reader.floats(*object_pose, "object_pose", {"7"});
-    rows.T_robot_object = spatial_pose(row.values(), "object_pose");
+    rows.T_robot_object = poses_of_rows("object_pose", row.values(), 7, {}).spatial.front();
   }
   return returned(run([&] { return import_rows(options, std::move(rows)); }), options);
 }
@@ -207,19 +185,18 @@ void bind_import(nb::module_& module) {
       .def_rw("unposed", &ImportOptions::unposed);
   module.def("import_tables", &import_tables_python, "options"_a,
              "The recording, and what is worth a warning.");
-  module.def(
-      "row_of_matrix", &row_of_matrix, "numbers"_a,
-      "The 12 or 16 numbers of a homogeneous matrix, m, by columns or by rows, whichever is a\n"
-      "rotation, as a position, mm, and a quaternion x, y, z, w; None where neither is.");
-  module.def("require_sound", nb::overload_cast<const ImportOptions&>(&palpate::require_sound),
-             "options"_a,
-             "Raises Error where import_frames() would refuse the options or the array.");
+  module.def("require_sound",
+             nb::overload_cast<const ImportOptions&, std::size_t>(&palpate::require_sound),
+             "options"_a, "pose_numbers"_a = 0,
+             "Raises Error where import_frames() would refuse the options, the array, or poses of "
+             "so many\n"
+             "numbers, which 0 leaves out.");
   module.def(
       "import_frames", &import_frames, "options"_a, "pressures"_a, "time_s"_a.none(),
       "pose_time_s"_a, "poses"_a = nb::none(), "object_pose"_a = nb::none(),
       "As import_tables() of frames [n, e] at times [n], or of touches, and of poses of the\n"
-      "sensor [m, 7] in the robot frame, mm and a quaternion x, y, z, w, at times [m], or one for\n"
-      "each frame where there are no times; and of an object's pose [7].");
+      "sensor [m, k] in the robot frame, as tables have them, at times [m], or one for each frame\n"
+      "where there are no times; and of an object's pose [7], mm and a quaternion x, y, z, w.");
 }
 
 }  // namespace palpate::python

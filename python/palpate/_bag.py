@@ -31,6 +31,9 @@ def read_bag(
     pressure_field: str | None = None,
     pose_topic: str | None = None,
     pose_field: str | None = None,
+    pose_unit: tuple[Literal["mm", "m"], Literal["rad", "deg"]] | None = None,
+    euler: str | None = None,
+    matrix: Literal["columns", "rows"] | None = None,
     tf: tuple[str, str] | str | None = None,
     truth_tf: tuple[str, str] | str | None = None,
     mount: tuple[float, float, float, float, float, float] | None = None,
@@ -53,8 +56,9 @@ def read_bag(
     or frame; several topics, of pads on one hand, are one array, whose elements follow in their order, and a
     frame of the first takes the nearest of the others; flags beside them that are called valid, validity,
     is_valid or mask make readings unknown;
-    pose_topic: of poses or transforms in metres, or of messages whose pose_field is one, or is a list of a
-    position and a quaternion, or of a matrix; or
+    pose_topic: of poses or transforms, or of messages whose pose_field is one, or a list of numbers as tables
+    have them: a position and a quaternion x, y, z, w, a matrix, x, y and an angle, or x, y, z and what euler
+    says; "linear,angular", whose numbers follow one another; in pose_unit, m and rad if None; or
     tf: (target, source), frames of /tf and /tf_static, T_target_source, the robot's base and the array;
     truth_tf: (base, object), where the object truly lies, for the recording's truth, which an object that
     moves by more than 1 mm or 1 degree does not have; object: its label. A frame of /tf_static that moves
@@ -78,7 +82,9 @@ def read_bag(
     for wrong, words in (
         (not names, "pressure_topic: names no topic; give one"),
         (pose_topic is not None and tf, "pose_topic and tf both say where the sensor is; leave one of them out"),
-        (pose_field is not None and pose_topic is None, "pose_field: is a field of poses; give pose_topic"),
+        *((given is not None and pose_topic is None, f"{name}: is of the poses of a topic; give pose_topic")
+          for name, given in (("pose_field", pose_field), ("pose_unit", pose_unit), ("euler", euler),
+                              ("matrix", matrix))),
         (mount is not None and unposed, "mount: is for poses; give pose_topic or tf"),
         (truth_tf and unposed, "truth_tf: needs the sensor's poses in the same frame; give pose_topic or tf"),
         (truth_tf and not object, "truth_tf: needs the object's label; give object="),
@@ -88,11 +94,12 @@ def read_bag(
     source = pose_topic or (":".join(tf) if tf else "")
     options["pressures"] = f"{name}: {', '.join(names)}"
     options["poses"] = f"{name}: {source}" if source else ""
+    options["pose_unit"] = pose_unit or (None if pose_topic is None else "m,rad")
     request = import_request(read_bag, options)
     _palpate.require_sound(request)
     with opened(name) as bag:
         pads = [bag.pressures(topic, pressure_field) for topic in names]
-        poses = [] if pose_topic is None else [bag.poses(pose_topic, pose_field)]
+        poses = [] if pose_topic is None else [bag.poses(pose_topic, pose_field, request)]
         tree = bag.transforms([chain for chain in (tf, truth_tf) if chain is not None])
         parts: list[Any] = [*pads, *poses, tree]
         bag.read(parts, progress)

@@ -7,11 +7,17 @@ from typing import Any
 
 import numpy
 
-from ._bag_transforms import Numbers, Rows, row_of, row_of_numbers, stamp_s
+from . import _palpate
+from ._bag_transforms import Numbers, Rows, stamp_s
 from ._error import Error
 
 #: Fields by which an item of a list is called.
 _NAMES = ("name", "label", "id", "child_frame_id", "frame_id", "header.frame_id")
+
+
+def parts_of(path: str) -> list[str]:
+    """The paths that commas separate."""
+    return re.split(r",(?![^[]*\])", path)
 
 
 def _without_keys(path: str) -> str:
@@ -54,11 +60,15 @@ def _at(message: Any, path: str) -> Any:
 
 
 def _flat(values: Any) -> list[float]:
-    """The numbers of a list, or of lists in it."""
-    if hasattr(values, "tolist"):
-        values = values.tolist()
+    """The numbers of a list, or of lists in it, or of a message: of its fields, or of the pose among them."""
     if isinstance(values, (int, float)):
         return [float(values)]
+    if hasattr(values, "tolist"):
+        return _flat(values.tolist())
+    if hasattr(values, "__msgtype__"):
+        fields = vars(values)
+        inner = fields.get("pose", fields.get("transform"))
+        values = [inner] if inner is not None else [fields[name] for name in fields if name != "__msgtype__"]
     if isinstance(values, str):
         raise TypeError("no number")
     return [number for value in values for number in _flat(value)]
@@ -82,11 +92,20 @@ class _Messages:
         self.path = path  #: of the numbers in a message
         self.has_header = has_header
         self.received = 0  #: messages without a time of their own
+        self.width = 0  #: numbers in a message
         self.rows = Rows()
 
     def add(self, topic: str, message: Any, received_s: float) -> None:
         try:
             row = self._row_of(message)
+            self.width = self.width or len(row)
+            if not self.width:
+                raise Error("holds no number; give another field")
+            if len(row) != self.width:
+                raise Error(
+                    f"{len(row)} numbers in message {len(self.rows)}, counted from 0, but {self.width} before; "
+                    "give a topic or a field of one length"
+                )
             stamped_s = stamp_s(message.header.stamp) if self.has_header else 0.0
         except Error as error:
             raise Error(f"{self.where}: {self.path or 'the message'}: {error}") from None
@@ -123,19 +142,10 @@ class Pressures(_Messages):
         self.invalid = 0  #: readings
         self.unlike = 0  #: messages whose flags are not as many as the readings
         self.far = 0  #: frames of the first pad that none of this one is near
-        self.elements = 0
 
     def _row_of(self, message: Any) -> Numbers:
         values = _at(message, self.path)
         row = values if hasattr(values, "dtype") and values.ndim == 1 else _flat(values)
-        self.elements = self.elements or len(row)
-        if not self.elements:
-            raise Error("holds no reading; give another field")
-        if len(row) != self.elements:
-            raise Error(
-                f"{len(row)} readings in message {len(self.rows)}, counted from 0, but {self.elements} "
-                "before; give a topic or a field of one length"
-            )
         readings = numpy.array(row, numpy.float64)
         flags = [] if self.flags is None else _spread(_at(message, self.flags), values)
         if len(flags) == len(readings):
@@ -155,28 +165,22 @@ class Pressures(_Messages):
 
 
 class Poses(_Messages):
-    """The poses of a topic."""
+    """The poses of a topic, as numbers of which the request of an import says what they are."""
+
+    def __init__(
+        self, log: str, topic: str, path: str, has_header: bool, request: _palpate.ImportOptions
+    ) -> None:
+        super().__init__(log, topic, path, has_header)
+        self.parts = parts_of(path)
+        self.request = request
+
+    def add(self, topic: str, message: Any, received_s: float) -> None:
+        super().add(topic, message, received_s)
+        if len(self.rows) == 1:
+            _palpate.require_sound(self.request, self.width)
 
     def _row_of(self, message: Any) -> Sequence[float]:
-        try:
-            pose = _at(message, self.path)
-            is_message = hasattr(pose, "__dict__") or hasattr(pose, "__slots__")
-            return row_of(pose) if is_message else row_of_numbers(_flat(pose))
-        except (AttributeError, TypeError):
-            raise Error(
-                "is no pose, no transform, and no list of 7, 12 or 16 numbers; give another pose_field"
-            ) from None
-        except ValueError:
-            raise Error(
-                f"the matrix of message {len(self.rows)}, counted from 0, is no rotation and position; give "
-                "another pose_field"
-            ) from None
-
-    def in_order(self) -> tuple[Numbers, Numbers]:
-        """Times, ascending, and the first pose of each, [n, 7]."""
-        time_s, rows = super().in_order()
-        times, first = numpy.unique(time_s, return_index=True)
-        return times, rows[first]
+        return [number for path in self.parts for number in _flat(_at(message, path))]
 
 
 def together(pads: Sequence[Pressures]) -> tuple[Numbers, Numbers]:

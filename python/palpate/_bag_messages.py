@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ._bag_fields import Poses, Pressures, _without_keys
+from . import _palpate
+from ._bag_fields import Poses, Pressures, _without_keys, parts_of
 from ._bag_transforms import Transforms
 from ._error import Error
 
@@ -25,7 +26,7 @@ _PRESSURES = {
 }
 #: Types that hold a pose.
 _POSES = (
-    *(f"geometry_msgs/msg/Pose{what}" for what in ("", "Stamped", "WithCovariance", "WithCovarianceStamped")),
+    *(f"geometry_msgs/msg/Pose{what}" for what in ("", "2D", "Stamped", "WithCovariance", "WithCovarianceStamped")),
     "geometry_msgs/msg/Transform", "geometry_msgs/msg/TransformStamped", "nav_msgs/msg/Odometry",
 )  # fmt: skip
 #: Lists of flags beside the readings that say which of them are valid.
@@ -115,18 +116,19 @@ class Bag:
         beside = ".".join([*parts[: len(flags) - 1], flags[-1]])
         return Pressures(self.name, topic, path, self.has_header(msgtype), beside or None)
 
-    def poses(self, topic: str, path: str | None) -> Poses:
+    def poses(self, topic: str, path: str | None, request: _palpate.ImportOptions) -> Poses:
         msgtype = self.type_of(topic)
         where = f"{self.name}: {topic}: {msgtype}"
-        first = re.split(r"[.[]", path or "")[0]
         if path is None and msgtype not in _POSES:
             raise Error(
                 f"{where} is no pose; name its field by pose_field, give a topic of "
                 f"{', '.join(_POSES)}, or frames by tf"
             )
-        if first and first not in (fields := self.fields(msgtype)):
-            raise Error(f"{where} has no field {first}; it has {', '.join(fields)}")
-        return Poses(self.name, topic, path or "", self.has_header(msgtype))
+        fields = self.fields(msgtype)
+        for first in [re.split(r"[.[]", part)[0] for part in parts_of(path or "")]:
+            if first and first not in fields:
+                raise Error(f"{where} has no field {first}; it has {', '.join(fields)}")
+        return Poses(self.name, topic, path or "", self.has_header(msgtype), request)
 
     def transforms(self, wanted: list[tuple[str, str]]) -> Transforms:
         """The frames of all topics of transforms, of which these chains are wanted."""

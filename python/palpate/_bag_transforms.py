@@ -1,6 +1,5 @@
 """Poses in space over time, and the tree of frames that /tf and /tf_static give."""
 
-import contextlib
 import math
 from array import array
 from collections.abc import Sequence
@@ -10,50 +9,22 @@ from typing import Any
 import numpy
 from numpy.typing import NDArray
 
-from . import _palpate
 from ._error import Error
 
 Numbers = NDArray[numpy.float64]  #: poses are [n, 7] mm, and a quaternion x, y, z, w; NaN where unknown
-_UNKNOWN = (math.nan,) * 7
 _USUAL_GAP_S = 0.1
 _STILL = 1.0  #: mm, and degrees, by which an object that lies still may seem to move
 _JITTER_S = 1.0  #: by which messages may come out of order
 _BLOCK = 1 << 14  #: rows of a chain at a time
 
 
-def _row(x: float, y: float, z: float, *quaternion: float) -> tuple[float, ...]:
-    """A position, m, and a quaternion as a row; NaN where the quaternion is of zeros, as of a robot that does
-    not know. Raises Error where it is no rotation."""
-    length = math.hypot(*quaternion)
-    if not 0.0 < length < math.inf:
-        return _UNKNOWN
-    if abs(length - 1.0) > 0.01:
-        raise Error(f"the quaternion's length is {length:.4g}, so that it is no rotation; give one of length 1")
-    return (1e3 * x, 1e3 * y, 1e3 * z, *(part / length for part in quaternion))
-
-
-def row_of(pose: Any) -> tuple[float, ...]:
-    """A Pose or a Transform, m, also within messages that hold one, as a row of mm and a quaternion; NaN where
-    it is not known. Raises Error where it is no rotation."""
-    while (inner := getattr(pose, "pose", getattr(pose, "transform", None))) is not None:
-        pose = inner
-    p = pose.position if hasattr(pose, "position") else pose.translation
-    q = pose.orientation if hasattr(pose, "orientation") else pose.rotation
-    return _row(p.x, p.y, p.z, q.x, q.y, q.z, q.w)
-
-
-def row_of_numbers(values: Sequence[float]) -> tuple[float, ...]:
-    """A list as a row: a position, m, and a quaternion x, y, z, w; or 12 or 16 numbers of a homogeneous
-    matrix, by columns or by rows, whichever is a rotation. Raises Error or ValueError where none is,
-    AttributeError of a list of another length."""
-    if len(values) == 7:
-        return _row(*values)
-    if len(values) not in (12, 16):
-        raise AttributeError("no pose")
-    row = _palpate.row_of_matrix(values)
-    if row is None:
-        raise ValueError("no rotation")
-    return tuple(row)
+def _row_of(transform: Any) -> tuple[float, ...]:
+    """A Transform, m, as a row; empty where it is no rotation, as tf leaves such transforms out, too."""
+    p, q = transform.translation, transform.rotation
+    length = math.hypot(q.x, q.y, q.z, q.w)
+    if not abs(length - 1.0) <= 0.01:
+        return ()
+    return (1e3 * p.x, 1e3 * p.y, 1e3 * p.z, q.x / length, q.y / length, q.z / length, q.w / length)
 
 
 def stamp_s(stamp: Any) -> float:
@@ -116,8 +87,6 @@ def _interpolated(log: tuple[Numbers, Numbers], at_s: Numbers, gap_s: float) -> 
     The position is on the line and the rotation on the shorter arc between two rows.
     """
     time_s, rows = log
-    if len(time_s) == 0:
-        return numpy.full((len(at_s), 7), math.nan)
     after = numpy.searchsorted(time_s, at_s).clip(max=len(time_s) - 1)
     before = numpy.where(time_s[after] == at_s, after, (after - 1).clip(min=0))
     step_s = time_s[after] - time_s[before]
@@ -192,12 +161,9 @@ class Transforms:
                 self._keep_chains()
             if edge.static:
                 edge.rows = Rows()
-            if edge.static or self.kept is None or child in self.kept:
-                row: tuple[float, ...] = _UNKNOWN
-                with contextlib.suppress(Error):  # tf leaves such transforms out, too
-                    row = row_of(transform.transform)
-                if not math.isnan(row[3]):
-                    edge.rows.add(stamp_s(transform.header.stamp), received_s, row)
+            wanted = edge.static or self.kept is None or child in self.kept
+            if wanted and (row := _row_of(transform.transform)):
+                edge.rows.add(stamp_s(transform.header.stamp), received_s, row)
 
     def _keep_chains(self) -> None:
         """Forgets what the wanted chains do not need, now that a frame has a parent."""

@@ -47,7 +47,12 @@ def _flag_parser() -> argparse.ArgumentParser:
         "matrices[1].data of one item, by its index, name or frame [the only list of numbers]")  # fmt: skip
     add("--pose-topic", metavar="TOPIC", help="topic of the array's poses in the robot frame")
     add("--pose-field", metavar="FIELD", help="field of its messages: a pose, or a list of a position and a "
-        "quaternion, or of a matrix [the pose of known types]")  # fmt: skip
+        "quaternion x, y, z, w, of a matrix, of x, y and an angle, or of the six numbers of --euler; or several "
+        "fields, as linear,angular [the pose of known types]")  # fmt: skip
+    add("--pose-unit", metavar="UNITS", help="mm,rad or mm,deg or m,rad or m,deg [m,rad]")
+    add("--euler", metavar="AXES", help="of six numbers: axes about which the last three turn, in their order: xyz, "
+        "zyx and so on about fixed axes, ZYX and so on about moving ones; or vector, a rotation vector")  # fmt: skip
+    add("--matrix", metavar="ORDER", help="columns or rows [the one by which they are rotations]")
     add("--tf", metavar="TARGET:SOURCE", help="frames of the robot's base and of the array, from /tf")
     add("--truth-tf", metavar="TARGET:SOURCE", help="frames of the robot's base and of the object")
     add("--mount", metavar="X,Y,Z,ROLL,PITCH,YAW", help="the array's pose in the frame whose poses are "

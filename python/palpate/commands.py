@@ -272,9 +272,10 @@ def import_tables(
     the right and y upwards, and which follow it; dead: elements that do not read, from 0; sign: -1
     where readings fall under load, which are taken times -1; poses: a CSV
     file of T_robot_sensor, in mm and rad where neither its columns' names nor pose_unit say otherwise, or,
-    beside readings, poses [m, 3] of x, y, theta, or [m, 7] of a position and a quaternion x, y, z, w, mm and
-    rad, at pose_time_s [m], or one for each frame; mount: x, y, z, roll, pitch, yaw, mm and degrees, the
-    array's pose in the frame whose poses are given; where: columns, and what their cells must be;
+    beside readings, poses [m, 3] of x, y, theta, [m, 7] of a position and a quaternion x, y, z, w, [m, 6] of
+    x, y, z and what euler says, or [m, 12] or [m, 16] of matrices, at pose_time_s [m], or one for each frame;
+    mount: x, y, z, roll, pitch, yaw, mm and degrees, the array's pose in the frame whose poses are given;
+    where: columns, and what their cells must be;
     plane: of the touches, where poses are in space: found from them, or its normal in the robot frame;
     pose_delay: by how much later the poses' clock reads than the readings', s; rate: frames per second
     of pressures without times, Hz; object: label of what was touched; truth:
@@ -293,10 +294,10 @@ def import_tables(
     elif isinstance(poses, (str, bytes, os.PathLike)):
         raise Error(f"poses: {os.fsdecode(poses)!r} is a file beside an array of pressures; give an array")
     else:
-        for name in ("pose_unit", "time_unit", "time_column", "header_line", "where", "pressure_columns",
-                     "pressure_component", "pose_columns", "euler", "matrix"):  # fmt: skip
+        for name in ("time_unit", "time_column", "header_line", "where", "pressure_columns",
+                     "pressure_component", "pose_columns"):  # fmt: skip
             if options[name] not in (None, []):
-                raise Error(f"{name}: is for tables; leave it out beside arrays, whose units are fixed")
+                raise Error(f"{name}: is for tables; leave it out beside arrays")
         if pose_time_s is not None and poses is None:
             raise Error("pose_time_s: is of poses; give poses")
         options |= {"pressures": "pressures", "poses": None if poses is None else "poses"}
@@ -305,20 +306,8 @@ def import_tables(
             pressures,
             time_s,
             () if pose_time_s is None else pose_time_s,
-            None if poses is None else _in_space(poses),
+            poses,
         )
     recording.truth = truth
     warn(sentences)
     return recording
-
-
-def _in_space(poses: "ArrayLike") -> "NDArray[numpy.float64]":
-    """Poses [m, 3] of the plane as [m, 7]; others as they are."""
-    import numpy
-
-    rows = numpy.asarray(poses, numpy.float64)
-    if rows.ndim != 2 or rows.shape[1] != 3:
-        return rows
-    half = 0.5 * rows[:, 2:]
-    zero = 0.0 * half
-    return numpy.hstack([rows[:, :2], zero, zero, zero, numpy.sin(half), numpy.cos(half)])

@@ -113,18 +113,17 @@ def test_topics_are_listed(log: pathlib.Path) -> None:
     [
         ({"pressure_topic": "/none"}, "has no topic /none; it has /hand, /plain"),
         ({"pressure_topic": "/pose"}, "/pose: geometry_msgs/msg/PoseStamped has no list of numbers"),
-        ({"pressure_topic": "/hand"}, "has the lists serial, fingers.taxels; name one by pressure_field"),
         ({"pressure_topic": "/hand", "pressure_field": "taxels"}, "no list of numbers taxels; it has serial"),
         ({"pose_topic": "/hand"}, "/hand: lab_msgs/msg/Hand is no pose"),
         ({"tf": ("base", "head")}, "joins these frames; on /tf, /tf_static are arm, array, base"),
-        ({"tf": ("array", "head")}, "tf array:head: no chain"),
-        ({"array": (2, 3, 2)}, "has 4 readings a frame for an array of 6 elements; correct array"),
         ({"pose_topic": "/p", "tf": ("a", "b")}, "both say where the sensor is"),
-        ({"tf": "base"}, "tf base: give two frames"),
         ({"tf": ("base", "arm", "array")}, "tf ('base', 'arm', 'array'): give two frames"),
         ({"pressure_topic": "/tf", "pressure_field": "transforms[].transform.rotation.w"}, "has 1 readings"),
         ({"pressure_topic": []}, "pressure_topic: names no topic"),
-        ({"tf": "base:array", "pose_field": "pose"}, "pose_field: is a field of poses; give pose_topic"),
+        ({"tf": "base:array", "pose_field": "pose"}, "pose_field: is of the poses of a topic; give"),
+        ({"euler": "vector"}, "euler: is of the poses of a topic; give pose_topic"),
+        # Before all is read, of which the frames would be refused.
+        ({"pose_topic": "/plain", "pose_field": "data", "truth_tf": "base:head", "object": "cup"}, "are of 4 numbers"),
         ({"tf": "base:array", "truth_tf": "base:cup"}, "truth_tf: needs the object's label"),
         ({"mount": (0, 0, 0, 0, 0, 0)}, "mount: is for poses; give pose_topic or tf"),
         ({"tf": ("base", "array"), "pose_delay": math.nan}, "pose_delay="),
@@ -157,8 +156,6 @@ def test_known_types_need_no_field(tmp_path: pathlib.Path, storage: str) -> None
         expected = [[int(10 * v) if factor == 10 else float(v) for v in readings(i)] for i in range(2)]
         assert recording.pressure.tolist() == expected
         assert numpy.isnan(recording.T_robot_sensor).all()
-    said = error_of(read_bag, log, **{**PLAIN, "pressure_topic": "/takktile"}, pressure_field="pressures")
-    assert "has no list of numbers pressures; it has pressure, temp" in said
 
 
 def test_every_kind_of_pose_is_read(tmp_path: pathlib.Path) -> None:
@@ -285,7 +282,6 @@ def test_a_log_that_is_cut_off_or_not_there_is_said(tmp_path: pathlib.Path, mcap
     assert f"mend it by: mcap recover {storage} -o" in error_of(topics, storage)
     storage.write_bytes(whole[:9] + struct.pack("<Q", 1 << 62) + whole[17:])  # the length of the first record
     assert "mcap: cannot be read as a bag (a part of it does not fit" in error_of(topics, mcap)
-    assert "none.bag: no such file" in error_of(topics, tmp_path / "none.bag")
 
 
 def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_path: pathlib.Path) -> None:
@@ -303,6 +299,7 @@ def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_pa
         assert run(mcap, "--list").status == 130
     for said in ("log: /s: list: is no pose", "log: array:base: turned out of the robot's xy plane: x is"):
         assert _in_flags(said, _flag_parser()) == said, "no flag stands in it"
+    posed = (*flags[:4], "--pose-topic", "/pose")
     unposed = run(mcap, *flags[:4], "-o", tmp_path / "unposed.h5")
     assert "none with a pose, as neither --tf nor --pose-topic is given" in unposed.out
     for arguments, words in (
@@ -316,11 +313,15 @@ def test_the_program_writes_what_the_function_returns(mcap: pathlib.Path, tmp_pa
         ((mcap, *flags, "-o", tmp_path / "none" / "f.h5"), ": cannot be written; give a file"),
         ((mcap, *flags, "--dead", "auto", "-o", file), "--dead auto: 'auto' is no element"),
         ((mcap, *flags, "--plane", "", "-o", file), "--plane: give auto, or "),
+        ((mcap, "--pressure-topic", "/hand", "--pressure-field", "fingers.taxels", "--array", "2:2:2", "--pose-topic",
+          "/pose", "--pose-field", "pose.position,pose.position", "-o", file),
+         "/pose: its poses are x, y, z and three angles or a rotation vector; give --euler xyz, roll, pitch and yaw"),
+        ((mcap, *posed, "--pose-unit", "m", "-o", file), "--pose-unit m: give mm,rad or"),
         ((mcap, *flags, "--mount", "auto", "-o", file), "--mount auto: give X,Y,Z,ROLL,PITCH,YAW"),
         ((mcap, *flags, "--mount", "", "-o", file), "--mount: give X,Y,Z,ROLL,PITCH,YAW, mm and degrees"),
         ((mcap, *flags, "--array", "2:3:2", "-o", file), "array of 6 elements; correct --array\n"),
         ((mcap, *flags, "--tf", "base:head", "-o", file), ": --tf base:head: no chain of transforms"),
-        ((mcap, "--pressure-topic", "/hand", *flags[2:], "-o", file), "name one by --pressure-field\n"),
+        ((mcap, "--pressure-topic", "/hand", *flags[2:], "-o", file), "fingers.taxels; name one by --pressure-field\n"),
     ):
         wrong = run(*arguments)
         assert wrong.status == 2 and words in wrong.err, wrong.err

@@ -4,30 +4,28 @@ move although they should not."""
 import math
 import pathlib
 import types
+from collections.abc import Callable
 from typing import Any
 
 import numpy
 import pytest
 from backports import zstd
 from conftest import error_of, warned
-from program import run_program
 
 import palpate
 from palpate import read_bag
 from palpate._bag_fields import Pressures, _item
-from palpate._bag_transforms import row_of_numbers
-from palpate.bag import main, topics
+from palpate.bag import topics
 
 from ros_bag import START_S, Bag, about_z
 
 
-def matrix(x: float, theta: float, by_rows: bool) -> numpy.ndarray:
+def matrix(x: float, theta: float, y: float = 0.2) -> numpy.ndarray:
     c, s = math.cos(theta), math.sin(theta)
-    rows = numpy.array([[c, -s, 0, x], [s, c, 0, 0.2], [0, 0, 1, 0.1], [0, 0, 0, 1]])
-    return rows.ravel() if by_rows else rows.T.ravel()
+    return numpy.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]])
 
 
-def write_states(path: pathlib.Path, by_rows: bool = False, skewed: int = -1) -> pathlib.Path:
+def write_states(path: pathlib.Path, skewed: int = -1) -> pathlib.Path:
     """Five states of a hand with a pad of two elements on each of two fingers, and a palm of one."""
     bag = Bag(path, "mcap")
     for i in range(5):
@@ -35,7 +33,7 @@ def write_states(path: pathlib.Path, by_rows: bool = False, skewed: int = -1) ->
         pads = [bag.of("lab_msgs/msg/Pad", name, numpy.array([i, first + i], dtype=numpy.float32),
                        numpy.array([True, name == "left" or i > 0]))
                 for name, first in (("left", 10), ("right", 20))]  # fmt: skip
-        pose = matrix(0.1 * i, 0.1 * i, by_rows)
+        pose = matrix(0.1 * i, 0.1 * i).T.ravel()
         pose[0] += 1.0 if i == skewed else 0.0
         tool = bag.pose("Pose", 0.1 * i, 0.2, 0.1, about_z(0.1 * i))
         bag.write("/state", bag.of("lab_msgs/msg/State", bag.header(at), pose, tool, pads), at)
@@ -76,6 +74,8 @@ def test_a_flag_is_that_of_its_readings(flags: Any, words: str) -> None:
     pads = Pressures("log", "/pads", "values", False, "valid")
     pads.add("/pads", types.SimpleNamespace(values=[numpy.array([1, 2]), numpy.array([3, 4])], valid=flags), START_S)
     assert words in " ".join(pads.remarks())
+    one = types.SimpleNamespace(values=[1], valid=1)
+    assert "1 numbers in message 1, counted from 0, but 4" in error_of(pads.add, "/pads", one, START_S)
     assert "has no list of numbers values" in error_of(pads.add, "/pads", types.SimpleNamespace(q=1), START_S)
 
 
@@ -91,9 +91,8 @@ def test_pads_on_two_topics_are_one_array(tmp_path: pathlib.Path) -> None:
     assert numpy.isnan(recording.pressure[2:, 2]).all(), "the palm is silent"
 
 
-@pytest.mark.parametrize("by_rows", [False, True])
-def test_a_field_of_the_message_is_the_pose(tmp_path: pathlib.Path, by_rows: bool) -> None:
-    log = write_states(tmp_path, by_rows)
+def test_a_field_of_the_message_is_the_pose(tmp_path: pathlib.Path) -> None:
+    log = write_states(tmp_path)
     expected = [[100 * i, 200, 0.1 * i] for i in range(5)]
     for field in ("tool", "O_T_EE"):
         recording = read(log, pose_topic="/state", pose_field=field)
@@ -104,6 +103,34 @@ def test_a_field_of_the_message_is_the_pose(tmp_path: pathlib.Path, by_rows: boo
     numpy.testing.assert_allclose(mounted.T_robot_sensor, expected, atol=1e-6)
 
 
+#: The numbers of a pose at x in m and turned by t, and how they are read.
+FORMS: dict[str, tuple[Callable[[float, float], Any], dict[str, Any]]] = {
+    "vector": (lambda x, t: [x, 0, 0, math.pi * math.cos(t / 2), math.pi * math.sin(t / 2), 0], {"euler": "vector"}),
+    "ZYX": (lambda x, t: [1e3 * x, 0, 0, math.degrees(t), 0, 180], {"euler": "ZYX", "pose_unit": ("mm", "deg")}),
+    "twist": (lambda x, t: [x, 0, 0, 0, 0, t], {"euler": "xyz", "pose_topic": "/t", "pose_field": "linear,angular"}),
+    "planar": (lambda x, t: [x, 0, t], {}),
+    "w first": (lambda x, t: [x, 0, 0, *about_z(t)[[3, 0, 1, 2]]],
+                {"pose_field": ",".join(f"data[{i}]" for i in (0, 1, 2, 4, 5, 6, 3))}),
+    "rows": (lambda x, t: matrix(x, t, 0).ravel(), {}),  # the first one, at 0, is a rotation by columns, too
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_numbers_are_poses_as_in_tables(tmp_path: pathlib.Path, form: str) -> None:
+    bag, (numbers, given) = Bag(tmp_path, "bag"), FORMS[form]
+    for i in range(5):
+        row = numpy.array(numbers(0.1 * i, 0.1 + 0.1 * i), numpy.float64)
+        layout = bag.of("std_msgs/msg/MultiArrayLayout", [], 0)
+        bag.write("/tcp", bag.of("std_msgs/msg/Float64MultiArray", layout, row), START_S + i)
+        vectors = [bag.of("geometry_msgs/msg/Vector3", *part) for part in (row[:3], row[-3:])]
+        bag.write("/t", bag.of("geometry_msgs/msg/Twist", *vectors), START_S + i)
+        bag.plain("/plain", [i, 1], START_S + i)
+    options = {"pressure_topic": "/plain", "array": (2, 1, 2), "pose_topic": "/tcp", "pose_field": "data", **given}
+    recording, said = warned(read_bag, bag.close(), **options)
+    numpy.testing.assert_allclose(recording.T_robot_sensor, [[100 * i, 0, 0.1 + 0.1 * i] for i in range(5)], atol=1e-9)
+    assert (": its poses are " in said) == (form not in ("planar", "w first"))
+
+
 def test_fields_that_a_message_lacks_are_named(tmp_path: pathlib.Path) -> None:
     log = write_states(tmp_path, skewed=3)
     for options, words in (
@@ -112,15 +139,15 @@ def test_fields_that_a_message_lacks_are_named(tmp_path: pathlib.Path) -> None:
          "they are called left, right"),
         ({"pressure_field": "pads.values[0][0]"}, "message 0, counted from 0, has no list of numbers pads.values"),
         ({"pressure_topic": ["/state", "/palm"]}, "no list of numbers pads[left].values"),
-        ({"pose_field": "O_T_EE"}, "the matrix of message 3, counted from 0, is no rotation"),
-        ({"pose_field": "pads"}, "is no pose, no transform"),
-        ({"pose_field": "pose"}, "has no field pose; it has header, O_T_EE, tool, pads"),
+        ({"pose_field": "O_T_EE"}, "/state[3]: the numbers are no rotation and position, read by columns"),
+        ({"pose_field": "pads"}, "message 0, counted from 0, has no list of numbers pads"),
+        ({"pose_field": "O_T_EE", "matrix": "rows"}, "/state[0]: the numbers are no rotation and position, read by r"),
+        ({"pose_field": "tool,pose"}, "has no field pose; it has header, O_T_EE, tool, pads"),
         ({}, "name its field by pose_field"),
     ):  # fmt: skip
         poses = {} if "pressure_topic" in options else {"pose_topic": "/state"}
         poses |= {"pose_field": "tool"} if "pressure_field" in options else {}
         assert words in error_of(read_bag, log, **{**STATE, **poses, **options})
-    assert "the quaternion's length is 2, so" in error_of(row_of_numbers, [0, 0, 0, 0, 0, 0, 2])
 
 
 def test_a_compressed_file_is_read_and_a_cut_one_told_how_to_be_mended(tmp_path: pathlib.Path) -> None:
@@ -140,16 +167,6 @@ def test_a_compressed_file_is_read_and_a_cut_one_told_how_to_be_mended(tmp_path:
     assert "log.tar: is no bag; unpack it" in error_of(read_bag, alone.rename(tmp_path / "log.tar"), **STATE)
     file.write_bytes(file.read_bytes()[:-300])
     assert f"mend it by: mcap recover {file} -o" in error_of(read_bag, file.parent, **STATE)
-
-
-def test_the_program_takes_them(tmp_path: pathlib.Path) -> None:
-    done = run_program(
-        main, write_states(tmp_path), "--pressure-topic", "/state", "--pressure-field", "pads[left].values",
-        "--pose-topic", "/state", "--pose-field", "tool", "--mount", "0,0,0,0,0,0", "--array", "2:1:2",
-        "-o", tmp_path / "f.h5",
-    )  # fmt: skip
-    assert done.status == 0, done.err
-    assert "5 frames of 2 elements, 5 with a pose" in done.out
 
 
 # Frames that move

@@ -79,11 +79,11 @@ def test_arrays_take_their_times_and_poses() -> None:
     )  # fmt: skip
     assert "1 of its frames have no pose" in said
     assert numpy.isnan(gap.T_robot_sensor[:, 0]).tolist() == [False, True, False]
-    quaternions = [[1, 2, 0, 0, 0, 0, 1]] * 3
-    mounted = palpate.import_tables(
-        READINGS, poses=quaternions, array=(2, 2, 1), rows="touches", mount=(1, 0, 0, 0, 0, 0)
-    )
-    numpy.testing.assert_allclose(mounted.T_robot_sensor, [[2, 2, 0]] * 3, atol=1e-9)
+    quaternion, vector = [1, 2, 0, 0, 0, 0, 1], [0.001, 0.002, 0, 0, 0, 0]
+    for pose, options in ((quaternion, {}), (vector, {"euler": "vector", "pose_unit": ("m", "rad")})):
+        mounted, _ = warned(palpate.import_tables, READINGS, poses=[pose] * 3, array=(2, 2, 1), rows="touches",
+                            mount=(1, 0, 0, 0, 0, 0), **options)  # fmt: skip
+        numpy.testing.assert_allclose(mounted.T_robot_sensor, [[2, 2, 0]] * 3, atol=1e-9)
 
 
 def test_what_neither_a_table_nor_arrays_can_have_is_refused(plain: pathlib.Path) -> None:
@@ -98,7 +98,7 @@ def test_what_neither_a_table_nor_arrays_can_have_is_refused(plain: pathlib.Path
         (READINGS, {**square, "poses": plain}, f"poses: '{plain}' is a file beside an array"),
         (READINGS, {**square, "time_s": [0, 1]}, "time_s"),
         (READINGS, {**square, "time_s": [0, 1, numpy.nan]}, "time_s[2]: nan is no time"),
-        (READINGS, {**square, "pose_unit": ("m", "deg")}, "pose_unit: is for tables"),
+        (READINGS, {**square, "header_line": 1}, "header_line: is for tables"),
         (READINGS, {**square, "poses": numpy.zeros((3, 3)), "pose_time_s": range(9)},
          "pose_time_s: shape (9,); give (m,) with m = 3 of poses"),
         (READINGS, {**square, "poses": [[0, 0, 0, 0, 0, 0, 3]] * 3}, "poses[0]: the quaternion's length is 3"),
