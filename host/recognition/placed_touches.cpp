@@ -50,16 +50,31 @@ double PlacedTouches::evaluate(const TouchEvidence& touch, const Pose& T_object_
 }
 
 double PlacedTouches::log_likelihood(const Pose& T_object_robot,
-                                     std::span<const Pose> displacements, TouchRange range) const {
+                                     std::span<const Pose> displacements, TouchRange range,
+                                     KnownNats* known) const {
   std::vector<double> nats(displacements.size());
+  std::vector<double>* of_touch = nullptr;
+  if (known != nullptr) {
+    const auto& [place, theta_rad] = T_object_robot;
+    of_touch = &(*known)[{place.x, place.y, theta_rad}];
+    of_touch->resize(touches_.size(), std::nan(""));
+  }
   double sum = 0.0;
-  for (const TouchEvidence& touch : touches_.subspan(range.begin, range.end - range.begin)) {
-    const double largest = evaluate(touch, T_object_robot, displacements, nats);
+  for (std::size_t i = range.begin; i < range.end; ++i) {
+    if (of_touch != nullptr && !std::isnan((*of_touch)[i])) {
+      sum += (*of_touch)[i];
+      continue;
+    }
+    const double largest = evaluate(touches_[i], T_object_robot, displacements, nats);
     double mean = 0.0;
     for (const double one : nats) {
       mean += std::exp(one - largest) / static_cast<double>(nats.size());
     }
-    sum += largest + std::log(mean);
+    const double log_mean = largest + std::log(mean);
+    sum += log_mean;
+    if (of_touch != nullptr) {
+      (*of_touch)[i] = log_mean;
+    }
   }
   return sum;
 }
@@ -80,10 +95,10 @@ Pose PlacedTouches::moved(const Pose& T_object_robot, const glm::dvec2& shift_mm
 }
 
 PlacedPeak PlacedTouches::climb(const Pose& from, std::span<const Pose> displacements,
-                                TouchRange range, double first_mm) const {
+                                TouchRange range, double first_mm, KnownNats* known) const {
   constexpr double finest_mm = 0.1;
   constexpr int most_moves = 40;  // of a step's length
-  PlacedPeak best{from, log_likelihood(from, displacements, range)};
+  PlacedPeak best{from, log_likelihood(from, displacements, range, known)};
   for (double step = first_mm; step >= finest_mm; step /= 2.0) {
     bool better = true;
     for (int moves = 0; better && moves < most_moves; ++moves) {
@@ -92,7 +107,7 @@ PlacedPeak PlacedTouches::climb(const Pose& from, std::span<const Pose> displace
         for (const double way : {step, -step}) {
           const Pose to = moved(best.T_object_robot, {axis == 0 ? way : 0.0, axis == 1 ? way : 0.0},
                                 axis == 2 ? way * rad_per_mm_ : 0.0);
-          const double nats = log_likelihood(to, displacements, range);
+          const double nats = log_likelihood(to, displacements, range, known);
           if (nats > best.nats) {
             best = {to, nats};
             better = true;

@@ -2,9 +2,12 @@
 
 #include "recognition/placement_judge.hpp"
 
+#include <cmath>
 #include <memory>
 #include <numbers>
+#include <regex>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include <gmock/gmock.h>
@@ -123,6 +126,33 @@ TEST_F(PlacementJudge, SaysAfterWhichTouchAnObjectMovedAndByHowMuch) {
   }
 }
 
+/// Nine touches with one of which no element lives before every other touch and at the end.
+Recording with_dead_touches(Recording touches) {
+  const std::size_t e = touches.elements();
+  for (const std::ptrdiff_t at : {9, 8, 6, 4, 2, 0}) {
+    touches.T_robot_sensor.insert(touches.T_robot_sensor.begin() + at, {{25.0, -40.0}, 1.0});
+    touches.pressure.insert(touches.pressure.begin() + at * std::ssize(touches.elements_mm), e,
+                            std::nan(""));
+  }
+  return touches;
+}
+
+TEST_F(PlacementJudge, LeavesOutTouchesThatTellNothing) {
+  const auto words_on = [&](const Recording& recording) {
+    const RecognitionStep step = letters_->last_step(recording);
+    return step.decision.because + "; " + testing::PrintToString(step.warnings);
+  };
+  for (const auto& [touches, said, with_dead] :
+       {std::tuple{moved(5, {1.2, 1.6}), "touch 5", "touch 8"},
+        {misplaced(letter_touches("A", 9, 21), 1.0, 22), "A", "A"},
+        {moved(8, {5.4, 7.2}), "touch 9", "touch 14"}}) {
+    const std::string words = words_on(touches);
+    ASSERT_THAT(words, HasSubstr(said));
+    EXPECT_EQ(words_on(with_dead_touches(touches)),
+              std::regex_replace(words, std::regex(said), with_dead));
+  }
+}
+
 TEST_F(PlacementJudge, TakesNoMoveFromASingleTouch) {
   for (const std::size_t after : {1, 8}) {  // of nine: one touch fits anywhere
     EXPECT_THAT(letters_->last_step(moved(after, {5.4, 7.2})).warnings,
@@ -136,6 +166,8 @@ TEST_F(PlacementJudge, TakesTheTouchSdThatIsToldAsExplained) {
   const RecognitionStep step = told.last_step(misplaced(letter_touches("A", 9, 21), 1.0, 22));
   EXPECT_EQ(told.task.labels[step.best], "A");
   EXPECT_THAT(step.warnings, Not(Contains(HasSubstr("touch-sd"))));
+  told.task.act.below_mm = 3.0;  // touches that lie nearer than that are none to warn of
+  EXPECT_TRUE(told.last_step(letter_touches("A", 9, 24)).decision.act);
 }
 
 TEST_F(PlacementJudge, IsNotOfOneTouchNorOfParticles) {
