@@ -25,8 +25,7 @@ struct PlacedPeak {
   double nats = 0.0;  ///< log-likelihood of the touches there
 };
 
-/// Log-likelihoods, [touch], at poses x, y, theta that climbs of some of the touches came by, for
-/// others that come by the same; NaN where no climb asked.
+/// [x, y, theta][touch] log-likelihoods that climbs of some touches left to others; or NaN.
 using KnownNats = std::map<std::array<double, 3>, std::vector<double>>;
 
 /// The likelihood of an unknown's touches on one object about a pose, where every touch may lie
@@ -41,11 +40,11 @@ class PlacedTouches {
 
   /// Sum over the touches of the log of the mean likelihood over the displacements.
   /// @param displacements equally likely, at least one
-  /// @param known of these displacements; is read and added to
   double log_likelihood(const Pose& T_object_robot, std::span<const Pose> displacements,
-                        TouchRange range, KnownNats* known = nullptr) const;
+                        TouchRange range) const;
   /// Climbs from a pose in steps along x, y and theta that halve from `first_mm` on, a turn as far
   /// as it moves the object.
+  /// @param known of the same displacements, for climbs that come by the same poses
   PlacedPeak climb(const Pose& from, std::span<const Pose> displacements, TouchRange range,
                    double first_mm, KnownNats* known = nullptr) const;
   /// Log of the volume under a peak over its height, in mm^2 rad, by the curvature there (Laplace);

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <numbers>
 #include <numeric>
 #include <span>
@@ -32,8 +31,7 @@ constexpr std::size_t touch_sd_points = 32;  // for the touch-sd that the task h
 constexpr double near_places = 30.0 * 30.0 * 0.8;
 /// Tempered log odds from which another explanation is taken before that of the step: objects
 /// seldom move, and the size of displacements is chosen to suit the touches.
-constexpr double least_displaced_nats = 4.0;
-constexpr double least_move_nats = 4.0;
+constexpr double least_nats = 4.0;
 /// The same before "(none)": two pieces of a learned object explain a few touches of a stranger.
 constexpr double least_move_over_none_nats = 8.0;
 
@@ -41,7 +39,7 @@ constexpr double least_move_over_none_nats = 8.0;
 struct Explanation {
   TouchPlacement placement;
   double log_evidence = log_zero;  ///< as Estimate::log_evidence
-  std::function<Fit()> fit;        ///< on the task's scale; costs as much as a climb
+  Fit fit = {};                    ///< on the task's scale
 };
 
 /// What all explanations of one unknown share.
@@ -79,15 +77,14 @@ class Explainer {
         placed_(touches_, question.task, static_cast<std::size_t>(object),
                 question.recogniser.lattice()) {}
 
-  /// The peak near a pose where touches lie as the task has it.
+  /// The peak where touches lie as the task has it.
   PlacedPeak unmoved(const Pose& from) const { return placed_.climb(from, told_, all_, 0.5); }
-  /// The log evidence by this peak: what bins say of a peak that is narrower than they are cannot
-  /// be compared with it.
+  /// By that peak: what bins say of a peak narrower than they are cannot be compared with it.
   double log_evidence(const PlacedPeak& unmoved) const {
     return log_evidence(unmoved.nats, placed_.log_volume(unmoved, told_, all_));
   }
-  /// Whether touches that lie beside their places by more than the task has it are likelier, at the
-  /// peak where they do not. Climbing from there gains less than an explanation has to.
+  /// Whether touches are likelier beside their places, by more than the task has it, at that peak:
+  /// climbing from there gains less than an explanation has to.
   bool may_be_displaced(const PlacedPeak& unmoved) const {
     return std::ranges::any_of(std::array{0.2, 0.4, 0.8, 1.6}, [&](double mm) {
       const auto at = displacement_points(displacement_of(mm), touch_sd_points);
@@ -119,7 +116,7 @@ class Explainer {
     peak = placed_.climb(peak.T_object_robot, at, all_, 0.25);
     return Explanation{.placement = {.object = object_, .displaced = sd},
                        .log_evidence = log_evidence(peak.nats, placed_.log_volume(peak, at, all_)),
-                       .fit = [=, this] { return fit(touches_, peak.T_object_robot, sd); }};
+                       .fit = fit(touches_, peak.T_object_robot, sd)};
   }
   /// The object moved once.
   /// @param starts where its parts are climbed from
@@ -134,10 +131,10 @@ class Explainer {
     double largest = log_zero;
     std::size_t after = 0;
     std::array<PlacedPeak, 2> parts;
-    const auto split = [&](std::size_t k) {
+    for (std::size_t k = 1; k < n; ++k) {
       const std::size_t in_contact = touches_in_contact(touches_.first(k));
       if (in_contact < fewest_in_contact || question_.in_contact - in_contact < fewest_in_contact) {
-        return;
+        continue;
       }
       const PlacedPeak a =
           placed_.climb(starts.before[k].T_object_robot, told_, {0, k}, 1.0, &known);
@@ -146,18 +143,6 @@ class Explainer {
         largest = a.nats + b.nats;
         after = k;
         parts = {a, b};
-      }
-    };
-    // Of many touches some splits are tried, and all about the best of these.
-    constexpr std::size_t most_splits = 64;
-    const std::size_t step = std::max<std::size_t>(1, n / most_splits);
-    for (std::size_t k = 1; k < n; k += step) {
-      split(k);
-    }
-    const std::size_t best = after;
-    for (std::size_t k = std::max(best, step) - step + 1; k < std::min(n, best + step); ++k) {
-      if (best > 0 && step > 1) {
-        split(k);
       }
     }
     if (after == 0) {
@@ -180,9 +165,7 @@ class Explainer {
                                      .moved_mm = moved_mm},
                        .log_evidence = log_evidence(largest, volumes - log_places) -
                                        std::log(static_cast<double>(n - 1)),
-                       .fit = [this, kept = std::move(kept), to = before.T_object_robot] {
-                         return fit(kept, to, question_.task.touch_sd());
-                       }};
+                       .fit = fit(kept, before.T_object_robot, task.touch_sd())};
   }
   /// The same with all parts climbed from one pose.
   std::optional<Explanation> moved(const Pose& from) const {
@@ -341,26 +324,20 @@ std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,
   }
   const PlacedPeak peak = explainers.front().unmoved(objects.front().second);
   const double unmoved = explainers.front().log_evidence(peak);
-  const auto explains = [&](const Explanation& one) {
-    const double least = one.placement.moved_after > 0 ? least_move_nats : least_displaced_nats;
-    if (!none) {
-      return (one.log_evidence - unmoved) / temperature > least &&
-             one.fit().verdict != Verdict::does_not_fit;
-    }
-    const Fit fit = one.fit();
-    if (fit.verdict == Verdict::does_not_fit) {
-      return false;
-    }
-    const Tempering tempering = tempering_of(touches, task, fit);
-    const std::size_t label = task.label_of[one.placement.object];
-    const double lead =
-        tempering.tempered(one.log_evidence, label) -
-        tempering.tempered(estimate.none_log_evidence.value_or(log_zero), step.best);
-    return lead > (one.placement.moved_after > 0 ? least_move_over_none_nats : 0.0);
-  };
   std::optional<Explanation> found;
   const auto consider = [&](const std::optional<Explanation>& one) {
-    if (one && (!found || one->log_evidence > found->log_evidence) && explains(*one)) {
+    if (!one || one->fit.verdict == Verdict::does_not_fit ||
+        (found && one->log_evidence <= found->log_evidence)) {
+      return;
+    }
+    double lead = (one->log_evidence - unmoved) / temperature - least_nats;
+    if (none) {
+      const Tempering tempering = tempering_of(touches, task, one->fit);
+      lead = tempering.tempered(one->log_evidence, task.label_of[one->placement.object]) -
+             tempering.tempered(estimate.none_log_evidence.value_or(log_zero), step.best) -
+             (one->placement.moved_after > 0 ? least_move_over_none_nats : 0.0);
+    }
+    if (lead > 0.0) {
       found = one;
     }
   };

@@ -17,9 +17,8 @@ struct TouchPlacement {
   int object = 0;  ///< index of the hypothesis
   /// How far each touch lies from where the robot says, by itself; none where the object moved.
   DisplacementSd displaced = {};
-  /// The last touch before the object moved that tells anything, from 1; 0 where it did not move.
-  std::size_t moved_after = 0;
-  double moved_mm = 0.0;  ///< by how much, as pose_error_mm() has it
+  std::size_t moved_after = 0;  ///< last touch before that tells anything, from 1; 0: it lay still
+  double moved_mm = 0.0;        ///< by how much, as pose_error_mm() has it
 };
 
 /// Judges where the touches lie before a step is believed: where "(none)" is best or the touches do
