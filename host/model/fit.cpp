@@ -151,11 +151,15 @@ std::vector<std::optional<FitSums>> fit_sums(std::span<const TouchEvidence> touc
                                              const DisplacementSd& touch_sd, std::size_t object) {
   constexpr std::size_t points = 128;  // log means of letters within 0.1 nats, sd 1 mm and 0.05 rad
   constexpr std::size_t draws = 64;    // the mean of z is out by 1 / sqrt(draws) at most
-  constexpr std::uint64_t seed = 0;
   const MapLikelihood likelihood(map, contact, object);
   const std::vector<Pose> displacements = displacement_points(touch_sd, points);
-  Random random(seed, Stream::readings);
   const auto displaced = [&](const TouchEvidence& known, const Pose& T_object_sensor) {
+    // By its readings alone (FNV-1a): no other touch and no rounding of poses changes its draws.
+    std::uint64_t seed = 0xcbf29ce484222325;
+    for (const Reading reading : known.readings) {
+      seed = (seed ^ static_cast<std::uint64_t>(reading)) * 0x100000001b3;
+    }
+    Random random(seed, Stream::readings);
     std::vector<Pose> drawn(draws);
     for (Pose& displacement : drawn) {
       displacement = random_displacement(touch_sd, random);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -80,10 +81,21 @@ Pose PlacedTouches::moved(const Pose& T_object_robot, const glm::dvec2& shift_mm
 }
 
 PlacedPeak PlacedTouches::climb(const Pose& from, std::span<const Pose> displacements,
-                                TouchRange range, double first_mm) const {
+                                TouchRange range, double first_mm, KnownNats* known) const {
   constexpr double finest_mm = 0.1;
   constexpr int most_moves = 40;  // of a step's length
-  PlacedPeak best{from, log_likelihood(from, displacements, range)};
+  const auto nats_at = [&](const Pose& to) {
+    if (known == nullptr) {
+      return log_likelihood(to, displacements, range);
+    }
+    auto& of = (*known)[{to.translation_mm.x, to.translation_mm.y, to.theta_rad}];
+    of.resize(touches_.size(), std::nan(""));
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      of[i] = std::isnan(of[i]) ? log_likelihood(to, displacements, {i, i + 1}) : of[i];
+    }
+    return std::accumulate(of.data() + range.begin, of.data() + range.end, 0.0);
+  };
+  PlacedPeak best{from, nats_at(from)};
   for (double step = first_mm; step >= finest_mm; step /= 2.0) {
     bool better = true;
     for (int moves = 0; better && moves < most_moves; ++moves) {
@@ -92,7 +104,7 @@ PlacedPeak PlacedTouches::climb(const Pose& from, std::span<const Pose> displace
         for (const double way : {step, -step}) {
           const Pose to = moved(best.T_object_robot, {axis == 0 ? way : 0.0, axis == 1 ? way : 0.0},
                                 axis == 2 ? way * rad_per_mm_ : 0.0);
-          const double nats = log_likelihood(to, displacements, range);
+          const double nats = nats_at(to);
           if (nats > best.nats) {
             best = {to, nats};
             better = true;
@@ -115,11 +127,7 @@ double PlacedTouches::log_volume(const PlacedPeak& peak, std::span<const Pose> d
         moved(peak.T_object_robot, step_mm * glm::dvec2(steps), step_mm * steps.z * rad_per_mm_),
         displacements, range);
   };
-  const auto unit = [](int axis) {
-    glm::dvec3 one(0.0);
-    one[axis] = 1.0;
-    return one;
-  };
+  const glm::dmat3 unit(1.0);
   glm::dmat3 curvature(1.0);
   double log_unit = 0.0;  // of the volume of the axes that do not stay
   for (int i = 0; i < 3; ++i) {
@@ -127,14 +135,14 @@ double PlacedTouches::log_volume(const PlacedPeak& peak, std::span<const Pose> d
       continue;
     }
     log_unit += 0.5 * std::log(2.0 * std::numbers::pi) + (i == 2 ? std::log(rad_per_mm_) : 0.0);
-    const double bent = 2.0 * peak.nats - at(unit(i)) - at(-unit(i));
+    const double bent = 2.0 * peak.nats - at(unit[i]) - at(-unit[i]);
     curvature[i][i] = std::max(bent / (step_mm * step_mm), least_curvature);
   }
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < i; ++j) {
       if (!stays(*axes[i]) && !stays(*axes[j])) {
-        const double mixed = at(unit(i) + unit(j)) + at(-unit(i) - unit(j)) -
-                             at(unit(i) - unit(j)) - at(unit(j) - unit(i));
+        const double mixed = at(unit[i] + unit[j]) + at(-unit[i] - unit[j]) -
+                             at(unit[i] - unit[j]) - at(unit[j] - unit[i]);
         // Where the touches' ripples outweigh the peak, axes count as independent.
         const double limit = 0.9 * std::sqrt(curvature[i][i] * curvature[j][j]);
         curvature[i][j] = curvature[j][i] =

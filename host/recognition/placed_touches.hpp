@@ -1,7 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <map>
 #include <span>
+#include <vector>
 
 #include "model/map_likelihood.hpp"
 #include "model/touch_evidence.hpp"
@@ -22,6 +25,9 @@ struct PlacedPeak {
   double nats = 0.0;  ///< log-likelihood of the touches there
 };
 
+/// [x, y, theta][touch] log-likelihoods that climbs of some touches left to others; or NaN.
+using KnownNats = std::map<std::array<double, 3>, std::vector<double>>;
+
 /// The likelihood of an unknown's touches on one object about a pose, where every touch may lie
 /// beside the place that the robot says, each by itself.
 class PlacedTouches {
@@ -38,8 +44,9 @@ class PlacedTouches {
                         TouchRange range) const;
   /// Climbs from a pose in steps along x, y and theta that halve from `first_mm` on, a turn as far
   /// as it moves the object.
+  /// @param known of the same displacements, for climbs that come by the same poses
   PlacedPeak climb(const Pose& from, std::span<const Pose> displacements, TouchRange range,
-                   double first_mm) const;
+                   double first_mm, KnownNats* known = nullptr) const;
   /// Log of the volume under a peak over its height, in mm^2 rad, by the curvature there (Laplace);
   /// axes that stay have none.
   double log_volume(const PlacedPeak& peak, std::span<const Pose> displacements,

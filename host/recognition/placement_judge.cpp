@@ -31,8 +31,7 @@ constexpr std::size_t touch_sd_points = 32;  // for the touch-sd that the task h
 constexpr double near_places = 30.0 * 30.0 * 0.8;
 /// Tempered log odds from which another explanation is taken before that of the step: objects
 /// seldom move, and the size of displacements is chosen to suit the touches.
-constexpr double least_displaced_nats = 4.0;
-constexpr double least_move_nats = 4.0;
+constexpr double least_nats = 4.0;
 /// The same before "(none)": two pieces of a learned object explain a few touches of a stranger.
 constexpr double least_move_over_none_nats = 8.0;
 
@@ -47,6 +46,8 @@ struct Explanation {
 struct Question {
   const Recogniser& recogniser;
   const RecognitionTask& task;
+  std::vector<TouchEvidence> touches = {};  ///< those that tell anything: others change no finding
+  std::vector<std::size_t> number = {};     ///< [touch] from 1, among all of the unknown
   double offset = 0.0;  ///< of log evidence without a weight from a log-likelihood over bins
   std::vector<double> log_weight = {};  ///< [hypothesis]
   std::size_t in_contact = 0;           ///< touches
@@ -72,41 +73,50 @@ class Explainer {
   Explainer(const Question& question, int object)
       : question_(question),
         object_(object),
-        touches_(question.recogniser.evidence()),
+        touches_(question.touches),
         placed_(touches_, question.task, static_cast<std::size_t>(object),
                 question.recogniser.lattice()) {}
 
-  /// The log evidence by the peak near a pose, where touches lie as the task has it: what bins say
-  /// of a peak that is narrower than they are cannot be compared with this.
-  double log_evidence_near(const Pose& from) const {
-    const auto at = displacement_points(question_.task.touch_sd(), touch_sd_points);
-    const PlacedPeak peak = placed_.climb(from, at, all_, 0.5);
-    return log_evidence(peak.nats, placed_.log_volume(peak, at, all_));
+  /// The peak where touches lie as the task has it.
+  PlacedPeak unmoved(const Pose& from) const { return placed_.climb(from, told_, all_, 0.5); }
+  /// By that peak: what bins say of a peak narrower than they are cannot be compared with it.
+  double log_evidence(const PlacedPeak& unmoved) const {
+    return log_evidence(unmoved.nats, placed_.log_volume(unmoved, told_, all_));
   }
-  /// The touches each lie somewhere else.
-  Explanation displaced(const Pose& from) const {
+  /// Whether touches are likelier beside their places, by more than the task has it, at that peak:
+  /// climbing from there gains less than an explanation has to.
+  bool may_be_displaced(const PlacedPeak& unmoved) const {
+    return std::ranges::any_of(std::array{0.2, 0.4, 0.8, 1.6}, [&](double mm) {
+      const auto at = displacement_points(displacement_of(mm), touch_sd_points);
+      return mm > question_.task.touch_sd().mm &&
+             placed_.log_likelihood(unmoved.T_object_robot, at, all_) > unmoved.nats;
+    });
+  }
+  /// The touches each lie somewhere else; none where no farther than the task has it.
+  std::optional<Explanation> displaced(const Pose& from) const {
     constexpr std::size_t points = 64;
     constexpr double least_mm = 0.2;
     constexpr double most_mm = 2.0;
-    const DisplacementSd touch_sd = question_.task.touch_sd();
-    const double rad_per_mm =
-        touch_sd.mm > 0.0 && touch_sd.rad > 0.0 ? touch_sd.rad / touch_sd.mm : usual_rad_per_mm;
+    const double told_mm = question_.task.touch_sd().mm;
     // Each round learns the standard deviation anew (expectation maximisation).
-    double sd_mm = std::max(1.0, touch_sd.mm);
+    double sd_mm = std::max(1.0, told_mm);
     PlacedPeak peak{from, 0.0};
     for (const double first_mm : {1.0, 0.5}) {
-      const auto at = displacement_points({sd_mm, rad_per_mm * sd_mm}, points / 2);
+      const auto at = displacement_points(displacement_of(sd_mm), points / 2);
       peak = placed_.climb(peak.T_object_robot, at, all_, first_mm);
       const double next_mm = placed_.displaced_mm(peak.T_object_robot, at, all_);
       // Twice its step, which is short.
       sd_mm = std::clamp(next_mm * next_mm / sd_mm, least_mm, most_mm);
     }
-    const DisplacementSd sd{sd_mm, rad_per_mm * sd_mm};
+    if (sd_mm <= told_mm) {
+      return {};
+    }
+    const DisplacementSd sd = displacement_of(sd_mm);
     const auto at = displacement_points(sd, points);
     peak = placed_.climb(peak.T_object_robot, at, all_, 0.25);
-    return {.placement = {.object = object_, .displaced = sd},
-            .log_evidence = log_evidence(peak.nats, placed_.log_volume(peak, at, all_)),
-            .fit = fit(touches_, peak.T_object_robot, sd)};
+    return Explanation{.placement = {.object = object_, .displaced = sd},
+                       .log_evidence = log_evidence(peak.nats, placed_.log_volume(peak, at, all_)),
+                       .fit = fit(touches_, peak.T_object_robot, sd)};
   }
   /// The object moved once.
   /// @param starts where its parts are climbed from
@@ -117,33 +127,22 @@ class Explainer {
     }
     const std::size_t n = touches_.size();
     const RecognitionTask& task = question_.task;
-    const auto at = displacement_points(task.touch_sd(), touch_sd_points);
+    KnownNats known;
     double largest = log_zero;
     std::size_t after = 0;
     std::array<PlacedPeak, 2> parts;
-    const auto split = [&](std::size_t k) {
+    for (std::size_t k = 1; k < n; ++k) {
       const std::size_t in_contact = touches_in_contact(touches_.first(k));
       if (in_contact < fewest_in_contact || question_.in_contact - in_contact < fewest_in_contact) {
-        return;
+        continue;
       }
-      const PlacedPeak a = placed_.climb(starts.before[k].T_object_robot, at, {0, k}, 1.0);
-      const PlacedPeak b = placed_.climb(starts.from[k].T_object_robot, at, {k, n}, 1.0);
+      const PlacedPeak a =
+          placed_.climb(starts.before[k].T_object_robot, told_, {0, k}, 1.0, &known);
+      const PlacedPeak b = placed_.climb(starts.from[k].T_object_robot, told_, {k, n}, 1.0, &known);
       if (a.nats + b.nats > largest) {
         largest = a.nats + b.nats;
         after = k;
         parts = {a, b};
-      }
-    };
-    // Of many touches some splits are tried, and all about the best of these.
-    constexpr std::size_t most_splits = 64;
-    const std::size_t step = std::max<std::size_t>(1, n / most_splits);
-    for (std::size_t k = 1; k < n; k += step) {
-      split(k);
-    }
-    const std::size_t best = after;
-    for (std::size_t k = std::max(best, step) - step + 1; k < std::min(n, best + step); ++k) {
-      if (best > 0 && step > 1) {
-        split(k);
       }
     }
     if (after == 0) {
@@ -156,12 +155,14 @@ class Explainer {
       kept[i].T_robot_sensor = move * kept[i].T_robot_sensor;
     }
     const double volumes =
-        placed_.log_volume(before, at, {0, after}) + placed_.log_volume(from, at, {after, n});
+        placed_.log_volume(before, told_, {0, after}) + placed_.log_volume(from, told_, {after, n});
     const std::optional<Body>& body = task.bodies[object_];
     const double moved_mm = body ? pose_error_mm(*body, task.hypotheses[object_].map.symmetry,
                                                  before.T_object_robot, from.T_object_robot)
                                  : 0.0;
-    return Explanation{.placement = {.object = object_, .moved_after = after, .moved_mm = moved_mm},
+    return Explanation{.placement = {.object = object_,
+                                     .moved_after = question_.number[after - 1],
+                                     .moved_mm = moved_mm},
                        .log_evidence = log_evidence(largest, volumes - log_places) -
                                        std::log(static_cast<double>(n - 1)),
                        .fit = fit(kept, before.T_object_robot, task.touch_sd())};
@@ -235,6 +236,12 @@ class Explainer {
     return nats + log_volume - question_.log_bin() + question_.offset +
            question_.log_weight[object_];
   }
+  /// Touches that lie this far beside their places, with the turn that the task has per mm.
+  DisplacementSd displacement_of(double mm) const {
+    const DisplacementSd told = question_.task.touch_sd();
+    const bool both = told.mm > 0.0 && told.rad > 0.0;
+    return {mm, (both ? told.rad / told.mm : usual_rad_per_mm) * mm};
+  }
   Fit fit(std::span<const TouchEvidence> touches, const Pose& T_object_robot,
           DisplacementSd sd) const {
     const RecognitionTask& task = question_.task;
@@ -249,6 +256,7 @@ class Explainer {
   std::span<const TouchEvidence> touches_;
   PlacedTouches placed_;
   TouchRange all_{0, touches_.size()};
+  std::vector<Pose> told_ = displacement_points(question_.task.touch_sd(), touch_sd_points);
 };
 
 /// The most probable hypotheses and where each explains the touches best.
@@ -297,6 +305,12 @@ std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,
     return {};
   }
   const int own = step.mode.object;
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    if (touches[i].tells()) {
+      question.touches.push_back(touches[i]);
+      question.number.push_back(i + 1);
+    }
+  }
   question.log_weight = log_weights(task.hypotheses);
   question.offset = estimate.log_evidence[own] - question.log_weight[own] -
                     (step.mode.log_likelihood - std::log(share));
@@ -308,30 +322,29 @@ std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,
   for (const auto& [object, from] : objects) {
     explainers.emplace_back(question, object);
   }
-  const double unmoved = explainers.front().log_evidence_near(objects.front().second);
-  const auto explains = [&](const Explanation& one) {
-    if (one.fit.verdict == Verdict::does_not_fit) {
-      return false;
-    }
-    const double least = one.placement.moved_after > 0 ? least_move_nats : least_displaced_nats;
-    if (!none) {
-      return (one.log_evidence - unmoved) / temperature > least;
-    }
-    const Tempering tempering = tempering_of(touches, task, one.fit);
-    const std::size_t label = task.label_of[one.placement.object];
-    const double lead =
-        tempering.tempered(one.log_evidence, label) -
-        tempering.tempered(estimate.none_log_evidence.value_or(log_zero), step.best);
-    return lead > (one.placement.moved_after > 0 ? least_move_over_none_nats : 0.0);
-  };
+  const PlacedPeak peak = explainers.front().unmoved(objects.front().second);
+  const double unmoved = explainers.front().log_evidence(peak);
   std::optional<Explanation> found;
   const auto consider = [&](const std::optional<Explanation>& one) {
-    if (one && explains(*one) && (!found || one->log_evidence > found->log_evidence)) {
+    if (!one || one->fit.verdict == Verdict::does_not_fit ||
+        (found && one->log_evidence <= found->log_evidence)) {
+      return;
+    }
+    double lead = (one->log_evidence - unmoved) / temperature - least_nats;
+    if (none) {
+      const Tempering tempering = tempering_of(touches, task, one->fit);
+      lead = tempering.tempered(one->log_evidence, task.label_of[one->placement.object]) -
+             tempering.tempered(estimate.none_log_evidence.value_or(log_zero), step.best) -
+             (one->placement.moved_after > 0 ? least_move_over_none_nats : 0.0);
+    }
+    if (lead > 0.0) {
       found = one;
     }
   };
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    consider(explainers[i].displaced(objects[i].second));
+    if (unexplained || explainers[i].may_be_displaced(peak)) {
+      consider(explainers[i].displaced(objects[i].second));
+    }
     consider(explainers[i].moved(objects[i].second));
   }
   // Displacements would make a search through the region long.

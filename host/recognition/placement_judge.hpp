@@ -17,7 +17,7 @@ struct TouchPlacement {
   int object = 0;  ///< index of the hypothesis
   /// How far each touch lies from where the robot says, by itself; none where the object moved.
   DisplacementSd displaced = {};
-  std::size_t moved_after = 0;  ///< touches before the object moved; 0 where it did not
+  std::size_t moved_after = 0;  ///< last touch before that tells anything, from 1; 0: it lay still
   double moved_mm = 0.0;        ///< by how much, as pose_error_mm() has it
 };
 
@@ -28,6 +28,7 @@ struct TouchPlacement {
 /// where the robot says, each by itself; or the object moved once, after two touches in contact or
 /// more and before two or more. Evidence decides, tempered as that of labels, by Laplace's
 /// approximation at the peaks that are found near the modes of the five most probable hypotheses.
+/// Touches without a known element change nothing.
 /// @param step its decision and fit are read
 /// @returns none where neither helps, for particles, and where objects slip
 std::optional<TouchPlacement> judge_placement(const Recogniser& recogniser,

@@ -117,8 +117,9 @@ std::vector<std::size_t> unlike_touches(std::span<const TouchEvidence> touches,
 }
 
 /// What to say of these touches.
-std::string unlike_words(std::span<const std::size_t> unlike, const RecognitionTask& task,
-                         const RecognitionStep& step) {
+/// @param last whether no other touch that tells anything comes after the first of them
+std::string unlike_words(std::span<const std::size_t> unlike, bool last,
+                         const RecognitionTask& task, const RecognitionStep& step) {
   double lowest_z = 0.0;
   std::vector<std::size_t> numbers;
   for (const std::size_t touch : unlike) {
@@ -127,7 +128,6 @@ std::string unlike_words(std::span<const std::size_t> unlike, const RecognitionT
   }
   const std::string name = task.name_of(step.mode.object);
   const bool one = unlike.size() == 1;
-  const bool last = unlike.front() + unlike.size() == step.touch_fit.size();
   return fmt::format(
       "touch{} {} fit{} {} {:.0f} standard deviations worse than touches of {} do, while the "
       "others "
@@ -150,16 +150,19 @@ void doubt_places(const Recogniser& recogniser, const Estimate& estimate,
     return;
   }
   const std::vector<std::size_t> unlike = unlike_touches(touches, task, step);
+  const auto are_all_from = [&](std::size_t first) {
+    return std::ranges::count_if(touches.subspan(first), &TouchEvidence::tells) ==
+           std::ssize(unlike);
+  };
   // One touch that is far off looks as if all were a little, or as if the object had moved, but
   // for the fits of the others.
-  const bool all_after_a_move =
-      placement && placement->moved_after + unlike.size() == touches.size();
+  const bool all_after_a_move = placement && are_all_from(placement->moved_after);
   if (placement && (unlike.empty() || all_after_a_move)) {
     const auto [finding, remedy] = words_of(*placement, task);
     step.decision = {false, finding};
     step.warnings.push_back(finding + ": " + remedy);
   } else if (!unlike.empty()) {
-    step.warnings.push_back(unlike_words(unlike, task, step));
+    step.warnings.push_back(unlike_words(unlike, are_all_from(unlike.front()), task, step));
     if (placement) {
       step.decision = {false, step.warnings.back()};
     }

@@ -127,6 +127,8 @@ TEST(DisplacedFit, IsTheReferences) {
             reference::fit_of(touches, T_object_robot, map, model, sd, 2);
         const std::optional<Fit> actual = fit_of(touches, T_object_robot, map, model, sd, 2);
         ASSERT_TRUE(actual && expected);
+        const std::vector reversed(touches.rbegin(), touches.rend());
+        EXPECT_NEAR(fit_of(reversed, T_object_robot, map, model, sd, 2)->z, actual->z, 1e-9);
         // z is out by about 1 / sqrt(64) by chance in M, and by a tenth of itself by chance in V.
         const double out = (actual->z - expected->z) / std::hypot(0.125, 0.1 * expected->z);
         EXPECT_LT(std::abs(out), 4.0) << expected->z << ' ' << actual->z;
