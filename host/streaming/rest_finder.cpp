@@ -213,16 +213,13 @@ RestFinder::Outline RestFinder::open(float sign, double window_s, std::vector<fl
   return outline;
 }
 
-/// What stands out of a rest as a longer window leaves it, beside its noise.
+/// What stands out of a rest as a longer window leaves it.
 RestFinder::Outline RestFinder::humps(double window_s, std::span<const float> rest) const {
   Outline outline{.foot = 0.25 * onset_};
   for (std::size_t k = 0; k < elements_; ++k) {
     const auto values = rest.subspan(k * time_s_.size(), time_s_.size());
     outline.add(k, values, opening(time_s_, values, window_s));
   }
-  std::vector<float> sorted = outline.above;
-  const float noise = quantile(sorted, 0.02);  // presses may leave few blocks between them
-  std::ranges::for_each(outline.above, [&](float& by) { by -= noise; });
   return outline;
 }
 
@@ -238,10 +235,8 @@ void RestFinder::bridge(const Outline& outline, double edge_s, Found& found) con
     std::size_t first = blocks;
     std::size_t last = 0;
     std::size_t peak = i;
-    std::size_t presses = 0;
     for (end = i; end < blocks && above[end] > outline.foot; ++end) {
       peak = above[end] > above[peak] ? end : peak;
-      presses += found.pressed[end] > found.pressed[end - 1] ? 1 : 0;
       if (above[end] > onset_) {
         first = std::min(first, end);
         last = end;
@@ -250,8 +245,7 @@ void RestFinder::bridge(const Outline& outline, double edge_s, Found& found) con
     if (last == 0 || end == blocks) {
       continue;
     }
-    if (presses > 1 || time_s_[first] - time_s_[i] > edge_s ||
-        time_s_[end - 1] - time_s_[last] > edge_s) {
+    if (time_s_[first] - time_s_[i] > edge_s || time_s_[end - 1] - time_s_[last] > edge_s) {
       found.slow_s = std::min(found.slow_s, time_s_[i]);
       continue;
     }
@@ -261,9 +255,8 @@ void RestFinder::bridge(const Outline& outline, double edge_s, Found& found) con
     const auto higher = [&](std::size_t block, std::size_t than) {
       return rest_of_peak[block] - rest_of_peak[than] > onset_;
     };
-    if ((from < ends && to < end + longest_foot && higher(end, to) && higher(from, to)) ||
-        (to + ends > blocks && i < from + longest_foot && higher(i - 1, from) &&
-         higher(to, from))) {
+    if ((from < ends && higher(end, to) && higher(from, to)) ||
+        (to + ends > blocks && higher(i - 1, from) && higher(to, from))) {
       for (std::size_t b = from; b <= to; ++b) {
         found.raised[b] = std::max(found.raised[b], above[b]);
       }
@@ -292,9 +285,9 @@ std::size_t RestFinder::foot_of(const Outline& outline, std::span<const float> r
     return to < rest.size() &&
            rest[block] - rest[to] > part * onset_ / step_s * std::abs(time_s_[to] - time_s_[block]);
   };
-  // The longer way tells slow falls in noise.
+  // The longer way tells slow falls in noise; what jumps further off does not fall here.
   for (std::size_t i = 0;
-       i < longest_foot && (falls(3, 1.0) || (falls(10, 1.0) && falls(3, 0.3))) &&
+       i < longest_foot && (falls(3, 1.0) || (falls(10, 1.0) && falls(5, 0.1))) &&
        outline.above[there(1)] <= outline.foot;
        ++i) {
     block = there(1);

@@ -117,40 +117,42 @@ double ramped(double t, double begin_s, double end_s, double ramp_s) {
   return std::clamp(std::min(t - begin_s, end_s - t) / ramp_s, 0.0, 1.0);
 }
 
-std::vector<Frame> frames_of(double seconds, const std::function<double(double)>& reading) {
-  return PressStream{.noise = 0.1}.frames(seconds, [&](double t) {
-    return std::vector{reading(t), reading(t) / 2.0};
-  });
+std::vector<Frame> frames_of(double seconds, const std::function<double(double)>& reading,
+                             const PressStream& stream = {.noise = 0.1}, std::size_t elements = 1) {
+  return stream.frames(seconds,
+                       [&](double t) { return std::vector<double>(elements, reading(t)); });
 }
 
-TEST(RestFinder, LongAndSlowPressesAreFoundBesideShortOnesAndDriftIsNoPress) {
+TEST(RestFinder, LongAndSlowPressesAreFoundBesideShortOnes) {
   for (const double short_kpa : {0.0, 8.0}) {
-    for (const double warm_kpa : {0.0, 6.0}) {
-      const std::vector<Frame> frames = frames_of(75.0, [&](double t) {
-        const double at = std::fmod(t, 15.0);
-        return warm_kpa * std::sin(t * 6.28 / 150.0) + 8.0 * ramped(at, 1.0, 13.0, 5.0) +
-               short_kpa * ramped(at, 13.5, 14.5, 0.1);
-      });
+    const auto reading = [&](double t) {
+      const double at = std::fmod(t, 15.0);
+      return 3.0 * std::sin(t / 24.0) + 6.0 * ramped(at, 1.0, 13.0, 5.0) +
+             short_kpa * ramped(at, 13.5, 14.5, 0.1);
+    };
+    for (const auto& frames : {frames_of(75.0, reading), frames_of(75.0, reading, {.noise = 0.4}),
+                               frames_of(75.0, reading, {.rate_hz = 50.0, .noise = 0.3}, 64)}) {
       const auto touches = touches_above(rest_of(frames), frames);
-      ASSERT_EQ(touches.size(), short_kpa > 0.0 ? 10u : 5u) << warm_kpa;
-      EXPECT_NEAR(touches[2].pressure[0], 8.0, 0.8) << warm_kpa;
+      ASSERT_EQ(touches.size(), short_kpa > 0.0 ? 10u : 5u) << frames[0].values.size();
+      EXPECT_NEAR(touches[2].pressure[0], 6.0, 0.8) << frames[0].values.size();
     }
   }
 }
 
 TEST(RestFinder, WhatTheStreamBeginsOrEndsWithIsNoTouch) {
-  const auto presses = [](double t) { return 8.0 * ramped(std::fmod(t, 10.0), 5.0, 8.0, 0.1); };
   const std::function<double(double)> ends[] = {
       [](double t) { return t > 33.0 ? 6.0 : 0.0; },              // an element jumps
       [](double t) { return 8.0 * ramped(t, 33.0, 50.0, 0.1); },  // a press is under way
       [](double t) { return 8.0 * ramped(t, 31.0, 39.0, 2.5); },  // and lifts
+      [](double t) { return 8.0 * ramped(t, 36.0, 37.8, 0.8); },
   };
   for (const auto& end : ends) {
-    std::vector<Frame> frames =
-        frames_of(37.5, [&](double t) { return t < 30.0 ? presses(t) : end(t); });
+    std::vector<Frame> frames = frames_of(37.5, [&](double t) {
+      return t < 30.0 ? 8.0 * ramped(std::fmod(t, 10.0), 5.0, 8.0, 0.1) : end(t);
+    });
     for (const std::optional<double> window_s : {std::optional<double>(), std::optional(20.0)}) {
       EXPECT_EQ(touches_above(rest_of(frames, window_s), frames).size(), 3u);
-      EXPECT_NEAR(rest_of(frames, window_s).changes_s.value_or(0.0), 33.0, 2.5);
+      EXPECT_GT(rest_of(frames, window_s).changes_s.value_or(0.0), 30.0);
     }
     for (std::size_t i = 0; 2 * i < frames.size(); ++i) {
       std::swap(frames[i].values, frames[frames.size() - 1 - i].values);
