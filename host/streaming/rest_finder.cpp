@@ -198,7 +198,7 @@ RestFinder::Outline RestFinder::open(float sign, double window_s, std::vector<fl
     const std::vector<float> values =
         is_alive(k) ? column(k, sign) : std::vector<float>(time_s_.size(), 0.0F);
     std::vector<float> opened = opening(time_s_, values, window_s);
-    const float near = 5.0F * noise_of(values);
+    const float near = 3.5F * noise_of(values);
     double sum = 0.0;
     double count = 0.0;
     for (std::size_t i = 0; i < values.size(); ++i) {
