@@ -67,11 +67,11 @@ std::vector<std::string> frame_findings(const Rest& rest, std::uint64_t backward
                     "the frames in the order of their times",
                     backwards, all));
   }
-  if (rest.rises_s) {
+  if (rest.changes_s) {
     words.push_back(fmt::format(
-        "from {:.2f} s on an element reads more by the onset for over {:.3g} s, which counts as "
-        "drift; if a press lasts that long, give --drift-s, more than its length",
-        *rest.rises_s, rest.window_s));
+        "from {:.2f} s on an element drifts by the onset, or is in a press that is slow, cut off "
+        "or over {:.3g} s long; record the whole press, and give --drift-s, more than its length",
+        *rest.changes_s, rest.window_s));
   }
   return words;
 }
@@ -385,8 +385,8 @@ void add_touches(CLI::App& app) {
                "Recording of touches to write (HDF5): per touch, the mean pressures above the "
                "elements' rest in its steady phase");
   add_detector_flags(*command, options->detector,
-                     "the shortest of 2 to 32 that leaves no press in the rest; 0: the rest is the "
-                     "recording's baseline");
+                     "32, and what comes or goes by less than the onset in 3 s is drift; 0: the "
+                     "rest is the recording's baseline");
   command->add_option("--slide", options->slide_mm,
                       "Presses during which the array slides: cut each into touches, one every so "
                       "many millimetres where the array moves steadily, with the pose at its "

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <limits>
 
@@ -10,7 +12,9 @@ namespace palpate {
 namespace {
 
 constexpr double block_s = 0.1;
-constexpr double step_s = 0.5;  // a press is applied in less
+constexpr double step_s = 3.0;            // a press rises by the onset in less, and falls so
+constexpr std::size_t longest_foot = 50;  // blocks; what falls on for longer is drift
+constexpr double never = std::numeric_limits<double>::infinity();
 constexpr float unknown_reading = std::numeric_limits<float>::quiet_NaN();
 
 /// The quantile; reorders the values.
@@ -45,17 +49,12 @@ std::vector<float> running(std::span<const double> time_s, std::span<const float
   return best;
 }
 
+/// The morphological opening, where windows that begin with the stream or end with it count at any
+/// length: what the stream begins or ends with is rest.
 std::vector<float> opening(std::span<const double> time_s, std::span<const float> values,
                            double window_s) {
-  return running(time_s, running(time_s, values, window_s, std::less<>{}), window_s,
-                 std::greater<>{});
-}
-
-/// The opening, where windows that begin with the stream or end with it count at any length: a
-/// stream that begins and ends untouched is then seen right to its ends.
-std::vector<float> opening_to_the_ends(std::span<const double> time_s,
-                                       std::span<const float> values, double window_s) {
-  std::vector<float> opened = opening(time_s, values, window_s);
+  std::vector<float> opened =
+      running(time_s, running(time_s, values, window_s, std::less<>{}), window_s, std::greater<>{});
   const std::size_t n = values.size();
   float from_begin = std::numeric_limits<float>::infinity();
   float to_end = from_begin;
@@ -78,28 +77,57 @@ void fill_unknown(std::span<float> values) {
   }
 }
 
+/// The standard deviation of the noise, by the lower quartile of second differences, which neither
+/// drift nor the edges of presses reach.
+float noise_of(std::span<const float> values) {
+  std::vector<float> differences;
+  for (std::size_t i = 2; i < values.size(); ++i) {
+    differences.push_back(std::abs(values[i - 2] - 2.0F * values[i - 1] + values[i]));
+  }
+  return differences.empty() ? 0.0F : quantile(differences, 0.25) / (0.3186F * std::sqrt(6.0F));
+}
+
 }  // namespace
 
-/// What an opening tells of the whole array.
-struct RestFinder::Opened {
-  std::vector<float> above;  ///< [b] how far the most loaded element reads above its rest
-  std::size_t steps = 0;     ///< blocks at which a rest has just risen by the onset
-  std::optional<double> first_step_s;
+/// What stands out of a rest.
+struct RestFinder::Outline {
+  double foot;                            ///< what is higher than this, and nowhere less, is one
+  std::vector<float> above = {};          ///< [b] how far the highest element stands out
+  std::vector<std::size_t> element = {};  ///< [b] which it is
+
+  void add(std::size_t which, std::span<const float> values, std::span<const float> rest) {
+    above.resize(values.size(), 0.0F);
+    element.resize(values.size(), 0);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const float by = values[i] - rest[i];
+      element[i] = by > above[i] ? which : element[i];
+      above[i] = std::max(above[i], by);
+    }
+  }
+};
+
+/// A rest, and where it is a line across a press.
+struct RestFinder::Found {
+  Rest rest;
+  std::vector<std::uint8_t> pressed;  ///< [b]
+  std::vector<float> raised;          ///< [b] what hides a press that is cut off
+  double slow_s = never;              ///< when the first begins that is no press
 };
 
 void Rest::at(double elapsed_s, std::vector<double>& rest) const {
-  const std::size_t e = time_s.empty() ? 0 : readings.size() / time_s.size();
+  const std::size_t b = time_s.size();
+  const std::size_t e = b == 0 ? 0 : readings.size() / b;
   rest.resize(e);
   if (e == 0) {
     return;
   }
   const auto after =
       static_cast<std::size_t>(std::ranges::upper_bound(time_s, elapsed_s) - time_s.begin());
-  const std::size_t high = std::min(after, time_s.size() - 1);
+  const std::size_t high = std::min(after, b - 1);
   const std::size_t low = after == 0 ? 0 : after - 1;
   const double part = high == low ? 0.0 : (elapsed_s - time_s[low]) / (time_s[high] - time_s[low]);
   for (std::size_t k = 0; k < e; ++k) {
-    rest[k] = std::lerp(double{readings[low * e + k]}, double{readings[high * e + k]}, part);
+    rest[k] = std::lerp(double{readings[k * b + low]}, double{readings[k * b + high]}, part);
   }
 }
 
@@ -161,158 +189,170 @@ std::vector<float> RestFinder::column(std::size_t element, float sign) const {
   return values;
 }
 
-/// By how much the opening lies below the readings of the untouched array, for noise: the mean
-/// where it is known which blocks are untouched, else the lower quartile over all.
-float RestFinder::low_by(std::span<const float> values, std::span<const float> rest,
-                         std::span<const float> above) const {
-  double sum = 0.0;
-  double count = 0.0;
-  for (std::size_t i = 0; i < above.size(); ++i) {
-    if (above[i] <= onset_) {
-      sum += values[i] - rest[i];
-      count += 1.0;
+/// Opens all elements' readings, times `sign`, and writes the rest [e, b]: the opening, lifted by
+/// the mean of the readings near it, so that it lies amid the noise of the untouched array.
+/// @returns what stands out of the rest
+RestFinder::Outline RestFinder::open(float sign, double window_s, std::vector<float>& rest) const {
+  Outline outline{.foot = release_};
+  for (std::size_t k = 0; k < elements_; ++k) {
+    const std::vector<float> values =
+        is_alive(k) ? column(k, sign) : std::vector<float>(time_s_.size(), 0.0F);
+    std::vector<float> opened = opening(time_s_, values, window_s);
+    const float near = 3.5F * noise_of(values);
+    double sum = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const float by = values[i] - opened[i];
+      sum += by <= near ? by : 0.0F;
+      count += by <= near ? 1.0 : 0.0;
     }
+    std::ranges::for_each(opened, [&](float& v) { v += static_cast<float>(sum / count); });
+    outline.add(k, values, opened);
+    rest.insert(rest.end(), opened.begin(), opened.end());
   }
-  if (count > 0.0) {
-    return static_cast<float>(sum / count);
-  }
-  std::vector<float> differences(values.begin(), values.end());
-  for (std::size_t i = 0; i < rest.size(); ++i) {
-    differences[i] -= rest[i];
-  }
-  return quantile(differences, 0.25);
+  return outline;
 }
 
-/// Opens all elements' readings, times `sign`, and writes the rest [b, e] where it is asked for.
-/// @param above of an opening before, which tells where the array is untouched; or empty
-RestFinder::Opened RestFinder::open(float sign, double window_s, std::span<const float> above,
-                                    std::vector<float>* readings) const {
-  const std::size_t blocks = time_s_.size();
-  Opened opened{.above = std::vector<float>(blocks, 0.0F)};
-  std::vector<std::uint8_t> step(blocks, 0);
-  if (readings != nullptr) {
-    readings->assign(readings_.size(), 0.0F);
-  }
+/// What stands out of a rest as a longer window leaves it.
+RestFinder::Outline RestFinder::humps(double window_s, std::span<const float> rest) const {
+  Outline outline{.foot = 0.25 * onset_};
   for (std::size_t k = 0; k < elements_; ++k) {
-    if (!is_alive(k)) {
+    const auto values = rest.subspan(k * time_s_.size(), time_s_.size());
+    outline.add(k, values, opening(time_s_, values, window_s));
+  }
+  return outline;
+}
+
+/// Makes the rest a line across every press, from foot to foot. A press that is cut off by the
+/// stream's begin or end in its edge has no two feet, and is hidden.
+/// @param edge_s a press rises from its foot to the onset in less, and falls as fast
+void RestFinder::bridge(const Outline& outline, double edge_s, Found& found) const {
+  constexpr std::size_t ends = 6;  // blocks
+  const std::vector<float>& above = outline.above;
+  std::vector<float>& rest = found.rest.readings;
+  const std::size_t blocks = above.size();
+  for (std::size_t i = 0, end = 0; i < blocks; i = end + 1) {
+    std::size_t first = blocks;
+    std::size_t last = 0;
+    std::size_t peak = i;
+    for (end = i; end < blocks && above[end] > outline.foot; ++end) {
+      peak = above[end] > above[peak] ? end : peak;
+      if (above[end] > onset_) {
+        first = std::min(first, end);
+        last = end;
+      }
+    }
+    if (last == 0 || end == blocks) {
       continue;
     }
-    const std::vector<float> values = column(k, sign);
-    std::vector<float> rest = opening(time_s_, values, window_s);
-    const float low = low_by(values, rest, above);
-    std::size_t before = 0;
-    std::size_t long_before = 0;
-    for (std::size_t i = 0; i < blocks; ++i) {
-      rest[i] += low;
-      opened.above[i] = std::max(opened.above[i], values[i] - rest[i]);
-      for (; time_s_[before] < time_s_[i] - step_s; ++before) {
+    if (time_s_[first] - time_s_[i] > edge_s || time_s_[end - 1] - time_s_[last] > edge_s) {
+      found.slow_s = std::min(found.slow_s, time_s_[i]);
+      continue;
+    }
+    const auto rest_of_peak = std::span(rest).subspan(outline.element[peak] * blocks, blocks);
+    const std::size_t from = foot_of(outline, rest_of_peak, i - 1, -1);
+    const std::size_t to = foot_of(outline, rest_of_peak, end, 1);
+    const auto higher = [&](std::size_t block, std::size_t than) {
+      return rest_of_peak[block] - rest_of_peak[than] > onset_;
+    };
+    if ((from < ends && higher(end, to) && higher(from, to)) ||
+        (to + ends > blocks && higher(i - 1, from) && higher(to, from))) {
+      for (std::size_t b = from; b <= to; ++b) {
+        found.raised[b] = std::max(found.raised[b], above[b]);
       }
-      for (; time_s_[long_before] < time_s_[i] - 2.0 * step_s; ++long_before) {
-      }
-      const float drift = std::max(0.0F, rest[before] - rest[long_before]);
-      const bool known = time_s_[i] - time_s_.front() > 2.0 * step_s;
-      step[i] |= known && rest[i] - rest[before] - drift > onset_ ? 1 : 0;
-      if (readings != nullptr) {
-        (*readings)[i * elements_ + k] = rest[i];
+      continue;
+    }
+    for (std::size_t b = from + 1; b < to; ++b) {
+      found.pressed[b] = 1;
+      const double part = (time_s_[b] - time_s_[from]) / (time_s_[to] - time_s_[from]);
+      for (std::size_t k = 0; k < rest.size(); k += blocks) {
+        rest[k + b] = std::lerp(rest[k + from], rest[k + to], static_cast<float>(part));
       }
     }
+    end = std::max(end, to);
   }
-  for (std::size_t i = 0; i < blocks; ++i) {
-    if (step[i] != 0) {
-      ++opened.steps;
-      opened.first_step_s = opened.first_step_s.value_or(time_s_[i]);
-    }
-  }
-  return opened;
 }
 
-/// open(), with what is untouched by an opening before.
-RestFinder::Opened RestFinder::settle(float sign, double window_s,
-                                      std::vector<float>* readings) const {
-  return open(sign, window_s, open(sign, window_s, {}, nullptr).above, readings);
+/// The last block from `block` on, in steps of `way`, to which an element's rest [b] falls as after
+/// a press, with nothing that stands out between.
+std::size_t RestFinder::foot_of(const Outline& outline, std::span<const float> rest,
+                                std::size_t block, int way) const {
+  const auto there = [&](int steps) {  // wraps around before the first
+    return static_cast<std::size_t>(static_cast<std::ptrdiff_t>(block) + steps * way);
+  };
+  const auto falls = [&](int steps, double part) {
+    const std::size_t to = there(steps);
+    return to < rest.size() &&
+           rest[block] - rest[to] > part * onset_ / step_s * std::abs(time_s_[to] - time_s_[block]);
+  };
+  // The longer way tells slow falls in noise; what jumps further off does not fall here.
+  for (std::size_t i = 0;
+       i < longest_foot && (falls(3, 1.0) || (falls(10, 1.0) && falls(5, 0.1))) &&
+       outline.above[there(1)] <= outline.foot;
+       ++i) {
+    block = there(1);
+  }
+  return block;
 }
 
-double RestFinder::window_for(float sign) const {
+/// Finds the rest of the readings times `sign`, by the given window or by all.
+RestFinder::Found RestFinder::rest_of(float sign, std::optional<double> window_s) const {
   constexpr double shortest_s = 2.0;
   constexpr double longest_s = 32.0;
-  double best_s = shortest_s;
-  std::size_t fewest = std::numeric_limits<std::size_t>::max();
-  for (double window_s = shortest_s; window_s <= longest_s; window_s *= 2.0) {
-    const std::size_t steps = settle(sign, window_s, nullptr).steps;
-    if (steps == 0) {
-      return window_s;
-    }
-    if (2 * steps < fewest) {
-      fewest = steps;
-      best_s = window_s;
-    }
+  const double until_s = window_s.value_or(longest_s);
+  Found found{.rest = {.window_s = until_s, .time_s = time_s_},
+              .pressed = std::vector<std::uint8_t>(time_s_.size(), 0),
+              .raised = std::vector<float>(time_s_.size(), 0.0F)};
+  std::vector<float>& rest = found.rest.readings;
+  bridge(open(sign, std::min(shortest_s, until_s), rest), never, found);
+  for (double wide_s = window_s.value_or(2.0 * shortest_s); wide_s <= until_s; wide_s *= 2.0) {
+    found.slow_s = never;
+    bridge(humps(wide_s, rest), window_s ? never : 0.75 * step_s, found);
   }
-  return best_s;
+  return found;
 }
 
-/// How far each block's most distant element lies above its rest, or below it for the sign -1, [b].
-std::vector<float> RestFinder::departure(float sign, double window_s) const {
-  std::vector<float> highest(time_s_.size(), 0.0F);
-  for (std::size_t k = 0; k < elements_; ++k) {
-    if (!is_alive(k)) {
-      continue;
-    }
-    const std::vector<float> values = column(k, sign);
-    const std::vector<float> rest = opening_to_the_ends(time_s_, values, window_s);
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      highest[i] = std::max(highest[i], values[i] - rest[i]);
+/// When an element's rest [e, b] first rises or falls by the onset in step_s beside drift, which
+/// goes on before or after.
+double RestFinder::first_step(std::span<const float> rest) const {
+  constexpr auto step = static_cast<std::size_t>(step_s / block_s);
+  const std::size_t blocks = time_s_.size();
+  std::size_t first = blocks;
+  for (std::size_t k = 0; k < rest.size(); k += blocks) {
+    for (std::size_t i = 1; i < first; ++i) {
+      const std::size_t from = i - std::min(i, step);
+      const std::size_t to = std::min(i + step, blocks - 1);
+      const float by = rest[k + i] - rest[k + from];
+      const float way = std::copysign(1.0F, by);
+      const float after = way * (rest[k + to] - rest[k + i]);
+      const float before = i < 2 * step ? after : way * (rest[k + from] - rest[k + from - step]);
+      const float drift = std::max(0.0F, to < i + step ? before : std::min(before, after));
+      first = std::abs(by) - drift > onset_ ? i : first;
     }
   }
-  return highest;
-}
-
-/// Whether the readings fall in presses. What departs from the rest does so first when the first
-/// press begins and last when the last press ends; seen from the level of the presses, the rest
-/// departs from it first when the first press ends.
-bool RestFinder::falls() const {
-  const double window_s = std::max(window_for(1.0F), window_for(-1.0F));
-  const std::vector<float> up = departure(1.0F, window_s);
-  const std::vector<float> down = departure(-1.0F, window_s);
-  const float highest = std::max(*std::ranges::max_element(up), *std::ranges::max_element(down));
-  const auto departs = [&](float by) {
-    return by > std::max(static_cast<float>(onset_), 0.3F * highest);
-  };
-  const auto first = [&](const std::vector<float>& by) {
-    return std::ranges::find_if(by, departs) - by.begin();
-  };
-  const auto last = [&](const std::vector<float>& by) {
-    return std::find_if(by.rbegin(), by.rend(), departs) - by.rbegin();
-  };
-  return first(down) < first(up) && last(down) < last(up);
+  return first < blocks ? time_s_[first] : never;
 }
 
 Rest RestFinder::find(std::optional<double> window_s) {
   if (begin_s_) {
     end_block();
   }
-  Rest rest;
   if (time_s_.empty()) {
-    return rest;
+    return {};
   }
-  rest.window_s = window_s ? *window_s : window_for(1.0F);
-  rest.time_s = time_s_;
-  const Opened opened = settle(1.0F, rest.window_s, &rest.readings);
-  rest.rises_s = opened.first_step_s;
-  rest.falls = falls();
-  for (std::size_t i = 0, end = 0; i < time_s_.size(); i = end + 1) {
-    for (end = i; end < time_s_.size() && opened.above[end] > release_; ++end) {
-    }
-    if (i == 0 || end == time_s_.size()) {
-      continue;
-    }
-    const double across_s = time_s_[end] - time_s_[i - 1];
-    for (std::size_t b = i; b < end; ++b) {
-      const auto part = static_cast<float>((time_s_[b] - time_s_[i - 1]) / across_s);
-      for (std::size_t k = 0; k < elements_; ++k) {
-        rest.readings[b * elements_ + k] = std::lerp(rest.readings[(i - 1) * elements_ + k],
-                                                     rest.readings[end * elements_ + k], part);
-      }
-    }
+  const Found up = rest_of(1.0F, {});
+  const Found down = rest_of(-1.0F, {});
+  Found found = window_s ? rest_of(1.0F, window_s) : up;
+  Rest& rest = found.rest;
+  // Gaps between presses look like presses of the other sign, but the first press begins before
+  // the first gap, and the last press ends after the last gap.
+  rest.falls = down.pressed > up.pressed &&
+               std::lexicographical_compare(up.pressed.rbegin(), up.pressed.rend(),
+                                            down.pressed.rbegin(), down.pressed.rend());
+  const double changes_s = std::min(found.slow_s, first_step(rest.readings));
+  rest.changes_s = changes_s < never ? std::optional(changes_s) : std::nullopt;
+  for (std::size_t i = 0; i < rest.readings.size(); ++i) {
+    rest.readings[i] += found.raised[i % time_s_.size()];
   }
   return rest;
 }

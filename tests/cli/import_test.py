@@ -293,9 +293,9 @@ class ClocksOfLogs(ImportTest):
         clock is so much ahead."""
         noise = random.Random(3)
         log, poses, at_s = "time,p0,p1\n", "time,x_mm,y_mm,theta_rad\n", 0.0
-        for press in range(30):
+        for press in range(31):
             travel = [(0, 6 * press + 0.24 * i) for i in range(25)]
-            for pressure, place_mm in travel + [(10, 6 * (press + 1))] * noise.randint(20, 40):
+            for pressure, place_mm in travel + [(10, 6 * (press + 1))] * (noise.randint(20, 40) if press < 30 else 0):
                 log += f"{at_s:.3f},{pressure + 0.1 * noise.random():.3f},0.2\n"
                 poses += f"{at_s + ahead_s:.3f},{place_mm:.3f},0,0.1\n"
                 at_s += 0.02

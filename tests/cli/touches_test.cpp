@@ -121,7 +121,7 @@ TEST_F(TouchesCommand, SaysWhatMayCostTouches) {
   const Recording frames = frames_of("A,touches=8");
   EXPECT_EQ(remarks("touches f.h5 -o t.h5"), "");
   expect_refused("touches f.h5 -o u.h5 --drift-s 0.3",
-                 {"f.h5: ", "an element reads more by the onset", "--drift-s"});
+                 {"f.h5: ", "an element drifts by the onset", "--drift-s"});
   Recording falls = frames;
   for (double& reading : falls.pressure) {
     reading = -reading;
