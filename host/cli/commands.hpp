@@ -6,6 +6,9 @@ class App;
 
 namespace palpate::cli {
 
+/// The program `palpate`. Returns its exit status.
+int run_program(int argc, char** argv);
+
 // Each function adds one command with its flags to the program; the command runs once it is parsed.
 void add_devices(CLI::App& app);
 void add_sensors(CLI::App& app);
