@@ -246,7 +246,9 @@ glm::dquat rotation_of_vector(const glm::dvec3& v) {
 PoseTable read_poses(const std::filesystem::path& path, const TableOptions& options,
                      bool with_times) {
   CsvTable table = open_table(path, options);
-  const auto [time, pose] = find_columns(table, options);
+  const TimedPoseColumns found = find_columns(table, options);
+  const std::optional<UnitColumn>& time = found.time;
+  const PoseColumns& pose = found.pose;  // no structured binding, which lambdas may not capture
   PoseTable poses;
   const bool is_planar = pose.form == PoseForm::planar;
   const bool has_angles = is_planar || is_of_angles(pose.form);

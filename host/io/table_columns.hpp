@@ -132,7 +132,10 @@ PoseColumns pose_columns(const CsvTable& table, PoseForm form,
 /// @throws Error where the options name so many that they are no pose
 PoseColumns find_pose(const CsvTable& table, const TableOptions& options);
 
-using TimedPoseColumns = std::pair<std::optional<UnitColumn>, PoseColumns>;
+struct TimedPoseColumns {
+  std::optional<UnitColumn> time;
+  PoseColumns pose;
+};
 /// The times, and as find_pose() the poses, of a table of poses, which may have no names.
 /// @throws Error where the table has no pose
 TimedPoseColumns find_columns(const CsvTable& table, const TableOptions& options);
