@@ -268,7 +268,10 @@ TEST_F(ViewedFiles, RecordingsTellTheirScaleAndTheirRows) {
   const cli::ViewedFiles files(std::vector{(folder_ / "a.h5").string()});
   EXPECT_NEAR(nlohmann::json::parse(files.get("/file/0").value())["largest"], 50.0, 2.0);
   EXPECT_EQ(nlohmann::json::parse(files.get("/file/0/rows/7").value())["pose"].size(), 1u);
-  EXPECT_FALSE(files.get("/file/0/rows/8"));
+  for (const char* none : {"/file/0/rows/8", "/file/0/rows/-1", "/file/0/rows/x", "/file/0/rows",
+                           "/file/1", "/file/-1", "/file/", "/page/0", "file"}) {
+    EXPECT_FALSE(files.get(none)) << none;
+  }
 }
 
 TEST_F(ViewedFiles, FieldsOfAWrongTypeAreNamed) {
