@@ -13,7 +13,7 @@ int main(int argc, char** argv) try {
   std::vector<std::string> recordings;
   std::vector<palpate::Hypothesis> known;
   bool maps = false;
-  for (const std::string argument : std::vector<std::string>(argv + 1, argv + argc)) {
+  for (const std::string& argument : std::vector<std::string>(argv + 1, argv + argc)) {
     if (argument == "--maps") {
       maps = true;
     } else if (maps) {

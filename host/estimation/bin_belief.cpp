@@ -6,6 +6,7 @@
 
 #include "estimation/hypotheses.hpp"
 #include "model/random.hpp"
+#include "model/refuse.hpp"
 #include "palpate/pose.hpp"
 
 namespace palpate {
@@ -149,6 +150,7 @@ std::vector<std::vector<BinShare>> BinBelief::likely_bins(std::span<const int> a
   for (const int object : asked) {
     require_object(object, objects.size());
   }
+  require(least_share >= 0.0, "least_share", least_share, "give a number from 0");
   const double least = std::log(least_share);
   std::vector<std::vector<BinShare>> likely(objects.size());
   visit(asked, {(1.0 - rounding) * least_share},

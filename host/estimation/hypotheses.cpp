@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 
 namespace palpate {
 
@@ -32,15 +32,11 @@ void validate_hypotheses(std::span<const Hypothesis> hypotheses) {
     const OccupancyGrid& map = hypothesis.map;
     const double weight = hypothesis.weight;
     for (const OccupancyGrid* grid : {&map, &hypothesis.compared()}) {
-      if (const auto fault = fault_of(*grid)) {
-        throw Error(Fault::input, fmt::format("map '{}': {}", map.label, *fault));
-      }
+      require_sound_map(*grid);
     }
     if (!(weight > 0.0) || !std::isfinite(weight)) {
-      throw Error(Fault::input,
-                  fmt::format("map '{}': weight = {}: give a positive number, or leave the object "
-                              "out",
-                              map.label, weight));
+      refuse(fmt::format("map '{}'", map.label),
+             "weight = {}: give a positive number, or leave the object out", weight);
     }
   }
 }
@@ -58,20 +54,19 @@ std::optional<std::size_t> differing_prior(std::span<const Hypothesis> hypothese
 ContactModel resolve(const ContactModel& contact, std::span<const Hypothesis> hypotheses) {
   contact.validate();
   if (contact.table && contact.table->sets() != 1 && contact.table->sets() != hypotheses.size()) {
-    throw Error(Fault::input,
-                fmt::format("likelihood table: numbers of {} objects, but there are {} maps; give "
-                            "one set for all, or one for each",
-                            contact.table->sets(), hypotheses.size()));
+    refuse("likelihood table",
+           "numbers of {} objects, but there are {} maps; give one set for all, or one for each",
+           contact.table->sets(), hypotheses.size());
   }
   ContactModel resolved = contact;
   if (!contact.prior) {
     const OccupancyGrid& first = hypotheses.front().compared();
     if (const auto other = differing_prior(hypotheses)) {
       const OccupancyGrid& map = hypotheses[*other].compared();
-      throw Error(Fault::input,
-                  fmt::format("map '{}': prior {} differs from {} of map '{}'; build the maps "
-                              "together, or say which prior to use",
-                              map.label, map.prior, first.prior, first.label));
+      refuse(fmt::format("map '{}'", map.label),
+             "prior {} differs from {} of map '{}'; build the maps together, or say which prior to "
+             "use",
+             map.prior, first.prior, first.label);
     }
     resolved.prior = first.prior;
   }
@@ -95,18 +90,15 @@ double none_log_weight(double none_weight, std::span<const Hypothesis> hypothese
 
 void require_object(int object, std::size_t objects) {
   if (object < 0 || static_cast<std::size_t>(object) >= objects) {
-    throw Error(Fault::input,
-                fmt::format("object {}: there are {}, counted from 0", object, objects));
+    refuse(fmt::format("object {}", object), "there are {}, counted from 0", objects);
   }
 }
 
 PoseLattice with_pivot(PoseLattice lattice, const glm::dvec2& pivot_mm, const char* filter,
                        bool touched) {
   if (touched) {
-    throw Error(Fault::input,
-                fmt::format("{}: its touches are about the pivot {}, {} mm; call reset() before "
-                            "the pivot moves",
-                            filter, lattice.pivot_mm.x, lattice.pivot_mm.y));
+    refuse(filter, "its touches are about the pivot {}, {} mm; call reset() before the pivot moves",
+           lattice.pivot_mm.x, lattice.pivot_mm.y);
   }
   lattice.pivot_mm = pivot_mm;
   lattice.validate();

@@ -322,6 +322,7 @@ void write_map_server(const std::filesystem::path& yaml_path, const OccupancyGri
   if (yaml_path.extension() != ".yaml") {
     refuse(yaml_path, "is not named as a map_server map; end its name in .yaml");
   }
+  require_sound(yaml_path, fault_of(map));
   std::filesystem::path image_path = yaml_path;
   image_path.replace_extension(".pgm");
   constexpr double metres_per_mm = 1e-3;

@@ -61,11 +61,6 @@ void require_rows_of_touches(const Recording& recording) {
   }
 }
 
-bool is_finite(const Pose& pose) {
-  return std::isfinite(pose.translation_mm.x) && std::isfinite(pose.translation_mm.y) &&
-         std::isfinite(pose.theta_rad);
-}
-
 void require_text(const std::filesystem::path& path, std::string_view field,
                   std::string_view text) {
   if (!is_printable(text)) {

@@ -4,6 +4,7 @@
 #include <span>
 #include <string_view>
 
+#include "model/refuse.hpp"
 #include "palpate/touch.hpp"
 
 namespace palpate {
@@ -32,7 +33,5 @@ void require_rows(const std::filesystem::path& path, const Recording& head, std:
 
 /// Refuses a raw stream, whose rows are frames.
 void require_rows_of_touches(const Recording& recording);
-
-bool is_finite(const Pose& pose);
 
 }  // namespace palpate

@@ -13,8 +13,8 @@
 
 #include "learning/plane_sums.hpp"
 #include "model/bounding_box.hpp"
+#include "model/refuse.hpp"
 #include "model/touch_evidence.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -66,9 +66,7 @@ PressPlacer::PressPlacer(const Hypothesis& hypothesis, const ContactModel& conta
       likelihood_(layer_, contact_),
       lattice_(lattice) {
   lattice_.collapse_fixed().validate();
-  if (const auto fault = fault_of(layer_)) {
-    throw Error(Fault::input, fmt::format("map '{}': {}", layer_.label, *fault));
-  }
+  require_sound_map(layer_);
 }
 
 std::vector<float> PressPlacer::log_likelihoods(std::span<const TouchEvidence> press) {

@@ -11,7 +11,7 @@
 #include "learning/progress.hpp"
 #include "model/bounding_box.hpp"
 #include "model/map_likelihood.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 
 namespace palpate {
 
@@ -246,8 +246,7 @@ double fit_gamma(const LevelCounts& counts, double prior) {
 ReadingLayer mean_level_layer(double threshold, double full_level) {
   constexpr double least_full = 3.0;  // in thresholds; the unit is then one threshold
   if (!(threshold > 0.0 && std::isfinite(threshold))) {
-    throw Error(Fault::input,
-                fmt::format("threshold = {}: a layer of mean levels needs one above 0", threshold));
+    refuse(fmt::format("threshold = {}", threshold), "a layer of mean levels needs one above 0");
   }
   const double full = std::max(full_level, least_full * threshold);
   return {.of = MapLayer::mean_level,

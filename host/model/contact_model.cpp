@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "model/refuse.hpp"
 #include "model/touch_evidence.hpp"
-#include "palpate/error.hpp"
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
@@ -23,21 +23,18 @@ bool is_alive(const Touch& touch, std::size_t element) {
 void require_sound(const Touch& touch) {
   const std::size_t e = touch.pressure.size();
   if (touch.elements_mm.size() != e || (!touch.valid.empty() && touch.valid.size() != e)) {
-    throw Error(Fault::input,
-                fmt::format("touch: {} pressures, {} elements and {} validities; make them agree",
-                            e, touch.elements_mm.size(), touch.valid.size()));
+    refuse("touch", "{} pressures, {} elements and {} validities; make them agree", e,
+           touch.elements_mm.size(), touch.valid.size());
   }
   const auto finite = [](const glm::dvec2& p) { return std::isfinite(p.x) && std::isfinite(p.y); };
-  if (!finite(touch.T_robot_sensor.translation_mm) ||
-      !std::isfinite(touch.T_robot_sensor.theta_rad)) {
-    throw Error(Fault::input, "touch: T_robot_sensor is not finite; give finite numbers");
+  if (!is_finite(touch.T_robot_sensor)) {
+    refuse("touch", "T_robot_sensor is not finite; give finite numbers");
   }
   for (std::size_t i = 0; i < e; ++i) {
     if (!finite(touch.elements_mm[i]) || (is_alive(touch, i) && std::isinf(touch.pressure[i]))) {
-      throw Error(Fault::input,
-                  fmt::format("touch: element {}: its place or pressure is not finite; mark a dead "
-                              "element as not valid",
-                              i));
+      refuse("touch",
+             "element {}: its place or pressure is not finite; mark a dead element as not valid",
+             i);
     }
   }
 }
@@ -91,21 +88,12 @@ LikelihoodTable sampled(const ContactModel& contact) {
   return table;
 }
 
-[[noreturn]] void refuse_table(const std::string& fault) {
-  throw Error(Fault::input, "likelihood table: " + fault);
-}
-
 }  // namespace
 
 void ContactClassifier::validate() const {
-  if (!(threshold >= 0.0) || !std::isfinite(threshold)) {
-    throw Error(Fault::input, fmt::format("threshold = {}: give a pressure of at least 0, in the "
-                                          "recording's unit",
-                                          threshold));
-  }
-  if (!(ratio >= 0.0 && ratio < 1.0)) {
-    throw Error(Fault::input, fmt::format("ratio = {}: must be at least 0 and below 1", ratio));
-  }
+  require(threshold >= 0.0 && std::isfinite(threshold), "threshold", threshold,
+          "give a pressure of at least 0, in the recording's unit");
+  require(ratio >= 0.0 && ratio < 1.0, "ratio", ratio, "must be at least 0 and below 1");
 }
 
 std::vector<Reading> ContactClassifier::classify(const Touch& touch) const {
@@ -142,47 +130,43 @@ void LikelihoodTable::validate() const {
   constexpr double farthest = 1000.0;
   constexpr double least_step = 0.001;
   if (nodes < 2) {
-    refuse_table(fmt::format("nodes = {}: give at least 2", nodes));
+    refuse("likelihood table", "nodes = {}: give at least 2", nodes);
   }
   if (!(std::abs(first_log_odds) <= farthest && std::abs(last_log_odds) <= farthest &&
         last_log_odds - first_log_odds >= least_step * static_cast<double>(nodes - 1))) {
-    refuse_table(
-        fmt::format("{} nodes from log odds {} to {}: give ascending ones within +-{} "
-                    "nats, at least {} apart",
-                    nodes, first_log_odds, last_log_odds, farthest, least_step));
+    refuse("likelihood table",
+           "{} nodes from log odds {} to {}: give ascending ones within +-{} "
+           "nats, at least {} apart",
+           nodes, first_log_odds, last_log_odds, farthest, least_step);
   }
   if (levels() > most_reading_levels) {
-    refuse_table(fmt::format("level_edges: {} of them make {} levels, more than {}; give fewer",
-                             level_edges.size(), levels(), most_reading_levels));
+    refuse("likelihood table", "level_edges: {} of them make {} levels, more than {}; give fewer",
+           level_edges.size(), levels(), most_reading_levels);
   }
   for (std::size_t i = 0; i < level_edges.size(); ++i) {
     if (!std::isfinite(level_edges[i]) || (i > 0 && !(level_edges[i] > level_edges[i - 1]))) {
-      refuse_table(
-          fmt::format("level_edges[{}] = {}: give finite, ascending pressures", i, level_edges[i]));
+      refuse("likelihood table", "level_edges[{}] = {}: give finite, ascending pressures", i,
+             level_edges[i]);
     }
   }
   const std::size_t of_a_set = levels() * nodes;
   if (log_likelihood.empty() || log_likelihood.size() % of_a_set != 0) {
-    refuse_table(fmt::format("log_likelihood: {} numbers are no multiple of {} levels x {} nodes",
-                             log_likelihood.size(), levels(), nodes));
+    refuse("likelihood table", "log_likelihood: {} numbers are no multiple of {} levels x {} nodes",
+           log_likelihood.size(), levels(), nodes);
   }
   for (std::size_t i = 0; i < log_likelihood.size(); ++i) {
     if (!(std::abs(log_likelihood[i]) <= most_log_odds)) {
-      refuse_table(fmt::format("log_likelihood[{}, {}, {}] = {}: give nats within +-{:g}",
-                               i / of_a_set, i % of_a_set / nodes, i % nodes, log_likelihood[i],
-                               most_log_odds));
+      refuse("likelihood table", "log_likelihood[{}, {}, {}] = {}: give nats within +-{:g}",
+             i / of_a_set, i % of_a_set / nodes, i % nodes, log_likelihood[i], most_log_odds);
     }
   }
 }
 
 void ContactModel::validate() const {
   classifier.validate();
-  if (!(gamma >= 0.0 && gamma < 1.0)) {
-    throw Error(Fault::input, fmt::format("gamma = {}: must lie in [0, 1)", gamma));
-  }
-  if (prior && !(*prior > 0.0 && *prior < 1.0)) {
-    throw Error(Fault::input, fmt::format("prior = {}: must lie strictly between 0 and 1", *prior));
-  }
+  require(gamma >= 0.0 && gamma < 1.0, "gamma", gamma, "must lie in [0, 1)");
+  require(!prior || (*prior > 0.0 && *prior < 1.0), "prior", prior.value_or(0.0),
+          "must lie strictly between 0 and 1");
   if (table) {
     table->validate();
   }
@@ -226,9 +210,9 @@ std::vector<Reading> classify(const Touch& touch, const ContactModel& model,
 }
 
 void refuse_reading(std::size_t levels, std::size_t sets, Reading reading, std::size_t object) {
-  refuse_table(
-      fmt::format("it has {} levels and {} sets of numbers, none for level {} of object {}", levels,
-                  sets, static_cast<int>(reading), object));
+  refuse("likelihood table",
+         "it has {} levels and {} sets of numbers, none for level {} of object {}", levels, sets,
+         static_cast<int>(reading), object);
 }
 
 double ContactModel::log_likelihood(Reading reading, const MapSample& map,
@@ -238,7 +222,7 @@ double ContactModel::log_likelihood(Reading reading, const MapSample& map,
   }
   if (table) {
     const std::size_t sets = table->sets();
-    if (static_cast<std::size_t>(reading) >= table->levels() || (sets > 1 && object >= sets)) {
+    if (static_cast<std::size_t>(reading) >= table->levels() || (sets != 1 && object >= sets)) {
       refuse_reading(table->levels(), sets, reading, object);
     }
     return interpolate(*table, reading, map.log_odds, object);

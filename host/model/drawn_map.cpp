@@ -9,7 +9,7 @@
 
 #include "model/bounding_box.hpp"
 #include "model/cell_range.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -23,20 +23,17 @@ constexpr double margin = 4.0;
 constexpr double reach = 5.0;
 
 void require_sound(const std::string& label, const Mask& mask) {
-  const auto refuse = [&](const std::string& why) {
-    throw Error(Fault::input, fmt::format("mask of '{}': {}", label, why));
-  };
+  const std::string source = fmt::format("mask of '{}'", label);
   if (!(mask.pixel_mm >= least_length_mm && mask.pixel_mm <= most_length_mm)) {
-    refuse(fmt::format("a pixel = {} mm: give {:g} to {:g} mm", mask.pixel_mm, least_length_mm,
-                       most_length_mm));
+    refuse(source, "a pixel = {} mm: give {:g} to {:g} mm", mask.pixel_mm, least_length_mm,
+           most_length_mm);
   }
   if (!std::isfinite(mask.origin_mm.x) || !std::isfinite(mask.origin_mm.y)) {
-    refuse(
-        fmt::format("origin = {},{} mm: give finite numbers", mask.origin_mm.x, mask.origin_mm.y));
+    refuse(source, "origin = {},{} mm: give finite numbers", mask.origin_mm.x, mask.origin_mm.y);
   }
   if (mask.occupied.size() != mask.rows * mask.columns) {
-    refuse(fmt::format("{} pixels in {} rows of {}: give rows times columns", mask.occupied.size(),
-                       mask.rows, mask.columns));
+    refuse(source, "{} pixels in {} rows of {}: give rows times columns", mask.occupied.size(),
+           mask.rows, mask.columns);
   }
 }
 
@@ -110,17 +107,16 @@ void DrawnMapOptions::validate() const {
   MapOptions{.cell_mm = cell_mm, .sensor = {.spread_mm = spread_mm, .peak = peak, .prior = prior}}
       .validate();
   if (!(peak > 0.5)) {
-    throw Error(Fault::input, fmt::format("`peak {}`: must be above 0.5, or a drawing would say "
-                                          "nothing of what is occupied",
-                                          peak));
+    refuse(fmt::format("`peak {}`", peak),
+           "must be above 0.5, or a drawing would say nothing of what is occupied");
   }
   if (!(felt_share > 0.0 && felt_share < 1.0)) {
     throw Error(Fault::input, fmt::format("`felt-share {}`: must lie between 0 and 1", felt_share));
   }
   if (!(reach_mm >= 0.0 && reach_mm <= most_length_mm)) {
-    throw Error(Fault::input, fmt::format("reach = {} mm: give 0 to {:g} mm, the largest distance "
-                                          "of an element from the array's centre",
-                                          reach_mm, most_length_mm));
+    refuse(fmt::format("reach = {} mm", reach_mm),
+           "give 0 to {:g} mm, the largest distance of an element from the array's centre",
+           most_length_mm);
   }
 }
 
@@ -130,15 +126,14 @@ OccupancyGrid drawn_map(const std::string& label, const Mask& mask,
   require_sound(label, mask);
   const BoundingBox box = occupied_box(mask);
   if (box.empty()) {
-    throw Error(Fault::input,
-                fmt::format("mask of '{}': no pixel is occupied; mark those of the object", label));
+    refuse(fmt::format("mask of '{}'", label),
+           "no pixel of {} mm is occupied; mark those of the object, in mm", mask.pixel_mm);
   }
   const double margin_mm = 2.0 * options.reach_mm + margin * options.spread_mm;
   for (const double mm : {box.lower.x, box.lower.y, box.upper.x, box.upper.y}) {
     if (!(std::abs(mm) + margin_mm <= farthest_mm)) {
-      throw Error(Fault::input, fmt::format("mask of '{}': reaches {} mm from the origin; give an "
-                                            "origin nearer to it",
-                                            label, mm));
+      refuse(fmt::format("mask of '{}'", label),
+             "reaches {} mm from the origin; give an origin nearer to it", mm);
     }
   }
   OccupancyGrid map =
@@ -177,14 +172,11 @@ OccupancyGrid drawn_map(const std::string& label, const Mask& mask,
     cell = static_cast<float>(log_odds_from_probability(p));
   }
   if (std::ranges::none_of(map.log_odds, [](float cell) { return cell > 0.0F; })) {
-    throw Error(Fault::input,
-                fmt::format("mask of '{}': no cell would be occupied, so small or thin "
-                            "is the object; give a smaller spread, felt share or cell",
-                            label));
+    refuse(fmt::format("mask of '{}'", label),
+           "no cell would be occupied, so small or thin is the object; give a smaller spread, felt "
+           "share or cell");
   }
-  if (const auto fault = fault_of(map)) {
-    throw Error(Fault::input, fmt::format("map '{}': {}", label, *fault));
-  }
+  require_sound_map(map);
   if (const auto measured = measure_symmetry(map)) {
     map.suggested_symmetry = measured->suggested;
   }

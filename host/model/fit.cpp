@@ -9,6 +9,7 @@
 #include "model/map_likelihood.hpp"
 #include "model/random.hpp"
 #include "model/reading_mixture.hpp"
+#include "model/refuse.hpp"
 #include "model/touch_evidence.hpp"
 
 namespace palpate {
@@ -115,6 +116,12 @@ FitScale pooled(std::span<const FitScale> objects) {
 std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
                           const OccupancyGrid& map, const ContactModel& contact,
                           const DisplacementSd& touch_sd, std::size_t object) {
+  contact.validate();
+  require_sound_map(map);
+  require_finite(T_object_robot);
+  for (const double sd : {touch_sd.mm, touch_sd.rad}) {
+    require(sd >= 0.0 && std::isfinite(sd), "touch_sd", sd, "give finite numbers from 0");
+  }
   return evidence_fit(evidence_of(touches, contact), T_object_robot, map, contact, touch_sd,
                       object);
 }

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 
 namespace palpate {
 
@@ -60,9 +60,8 @@ void PoseLattice::validate() const {
   validate_axis("y_mm", y_mm);
   validate_axis("theta_rad", theta_rad);
   if (exceeds_circle()) {
-    throw Error(Fault::input, fmt::format("range theta_rad = {}:{}: wider than the full circle, "
-                                          "poses would count twice; give a range of at most 2 pi",
-                                          theta_rad.lower, theta_rad.upper));
+    refuse(fmt::format("range theta_rad = {}:{}", theta_rad.lower, theta_rad.upper),
+           "wider than the full circle, poses would count twice; give a range of at most 2 pi");
   }
   if (!is_near(pivot_mm.x) || !is_near(pivot_mm.y)) {
     throw Error(Fault::input, fmt::format("pivot_mm = {},{}: give numbers within +-{:g}",
@@ -75,6 +74,9 @@ bool PoseLattice::exceeds_circle() const { return beyond_circle_rad(theta_rad) >
 bool PoseLattice::full_circle() const { return beyond_circle_rad(theta_rad) == 0.0; }
 
 Pose PoseLattice::T_object_robot(std::int64_t index) const {
+  if (index < 0 || index >= bins()) {
+    throw Error(Fault::input, fmt::format("bin {}: there are {}, counted from 0", index, bins()));
+  }
   const std::int64_t in_plane = index % plane();
   return T_object_robot(x_mm.centre(static_cast<int>(in_plane % x_mm.count)),
                         y_mm.centre(static_cast<int>(in_plane / x_mm.count)),
@@ -86,13 +88,9 @@ Pose PoseLattice::T_object_robot(double x, double y, double theta) const {
 }
 
 std::int64_t PoseLattice::bin_of(const Pose& T_object_robot) const {
+  validate();
+  require_finite(T_object_robot);
   const glm::dvec2 place_mm = T_object_robot * pivot_mm;
-  if (!std::isfinite(place_mm.x) || !std::isfinite(place_mm.y) ||
-      !std::isfinite(T_object_robot.theta_rad)) {
-    throw Error(Fault::input,
-                fmt::format("pose {}, {}, {}: give finite numbers", T_object_robot.translation_mm.x,
-                            T_object_robot.translation_mm.y, T_object_robot.theta_rad));
-  }
   const double middle_rad = (theta_rad.lower + theta_rad.upper) / 2.0;
   const double turn_rad = wrap_angle(T_object_robot.theta_rad - middle_rad);
   return nearest_index(theta_rad, middle_rad + turn_rad) * plane() +

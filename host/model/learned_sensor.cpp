@@ -24,7 +24,7 @@ namespace {
 
 /// Throws Error, "sensor model: <field> = <value>: <remedy>", unless the value fits.
 template <typename Value>
-void require(bool fits, std::string_view field, const Value& value, std::string_view remedy) {
+void check(bool fits, std::string_view field, const Value& value, std::string_view remedy) {
   if (!fits) {
     throw Error(Fault::input, fmt::format("sensor model: {} = {}: {}", field, value, remedy));
   }
@@ -34,13 +34,13 @@ bool is_positive(double x) { return x > 0.0 && std::isfinite(x); }
 bool from_0(double x) { return x >= 0.0 && std::isfinite(x); }
 
 void require_finite(std::string_view field, double x) {
-  require(std::isfinite(x), field, x, "give a number");
+  check(std::isfinite(x), field, x, "give a number");
 }
 void require_positive(std::string_view field, double x) {
-  require(is_positive(x), field, x, "give a positive number");
+  check(is_positive(x), field, x, "give a positive number");
 }
 void require_from_0(std::string_view field, double x) {
-  require(from_0(x), field, x, "give a number from 0");
+  check(from_0(x), field, x, "give a number from 0");
 }
 
 /// The matrix of correlations; none where it is not positive definite.
@@ -59,9 +59,9 @@ void require_sound(const LearnedTable& table, const std::vector<double>& numbers
   const auto wrong = std::ranges::find_if_not(numbers, [](double log) { return log <= 0.0; });
   if (wrong != numbers.end()) {
     const std::ptrdiff_t i = wrong - numbers.begin();
-    require(false,
-            fmt::format("table: number [{}, {}]", i / ReadingLayer::nodes, i % ReadingLayer::nodes),
-            *wrong, "give the log of a probability, 0 or less");
+    check(false,
+          fmt::format("table: number [{}, {}]", i / ReadingLayer::nodes, i % ReadingLayer::nodes),
+          *wrong, "give the log of a probability, 0 or less");
   }
 }
 
@@ -70,9 +70,9 @@ void require_sound(const FeatureDistribution& distribution) {
     require_finite("features: mean", distribution.mean[i]);
     require_positive("features: sd", distribution.sd[i]);
   }
-  require(correlations_of(distribution).has_value(), "features: correlation",
-          fmt::format("[{}]", fmt::join(distribution.correlation, ", ")),
-          "give correlations that a distribution can have");
+  check(correlations_of(distribution).has_value(), "features: correlation",
+        fmt::format("[{}]", fmt::join(distribution.correlation, ", ")),
+        "give correlations that a distribution can have");
 }
 
 void require_sound(const FitScale& scale) {
@@ -88,12 +88,12 @@ void require_sound(const FitScale& scale) {
   }
   if (const auto& stranger = scale.stranger_single_touch) {
     require_finite("fit_scale: stranger_alone: mean", stranger->mean);
-    require(stranger->sd >= 1.0, "fit_scale: stranger_alone: sd", stranger->sd,
-            "give a number from 1, that of learned objects");
+    check(stranger->sd >= 1.0, "fit_scale: stranger_alone: sd", stranger->sd,
+          "give a number from 1, that of learned objects");
   }
   if (const auto& array = scale.array) {
-    require(is_positive(array->elements) && is_positive(array->spacing_mm), "fit_scale: array",
-            array->elements, "give a number of elements and a spacing_mm above 0");
+    check(is_positive(array->elements) && is_positive(array->spacing_mm), "fit_scale: array",
+          array->elements, "give a number of elements and a spacing_mm above 0");
   }
 }
 
@@ -164,31 +164,31 @@ void apply(const LearnedSensor& sensor, std::vector<Hypothesis>& hypotheses,
 }
 
 void LearnedSensor::validate() const {
-  require(pressure_unit == "kPa" || pressure_unit == "raw", "pressure_unit", pressure_unit,
-          "give kPa or raw");
+  check(pressure_unit == "kPa" || pressure_unit == "raw", "pressure_unit", pressure_unit,
+        "give kPa or raw");
   classifier.validate();
   require_from_0("noise", noise);
-  require(gamma >= 0.0 && gamma < 1.0, "gamma", gamma, "give a number in [0, 1)");
-  require(prior >= least_prior && prior <= 1.0 - least_prior, "prior", prior,
-          "give a probability from 1e-6 to 1 - 1e-6");
-  require(spread_mm >= least_length_mm && spread_mm <= most_length_mm, "spread_mm", spread_mm,
-          "give a length from 1e-6 to 1e6");
+  check(gamma >= 0.0 && gamma < 1.0, "gamma", gamma, "give a number in [0, 1)");
+  check(prior >= least_prior && prior <= 1.0 - least_prior, "prior", prior,
+        "give a probability from 1e-6 to 1 - 1e-6");
+  check(spread_mm >= least_length_mm && spread_mm <= most_length_mm, "spread_mm", spread_mm,
+        "give a length from 1e-6 to 1e6");
   for (const double sd : {touch_sd.mm, touch_sd.rad}) {
-    require(from_0(sd), "touch_sd", sd, "give numbers from 0");
+    check(from_0(sd), "touch_sd", sd, "give numbers from 0");
   }
   require_positive("temperature", temperature);
   require_from_0("temperature_growth", temperature_growth);
   if (bins) {
     for (const double step : {bins->x_mm, bins->y_mm, bins->theta_rad}) {
-      require(from_0(step), "bins", step, "give steps from 0");
+      check(from_0(step), "bins", step, "give steps from 0");
     }
   }
   if (table) {
     table->layer.validate();
     require_sound(*table, table->shared);
     for (const auto& [label, own] : table->objects) {
-      require(own.size() == table->shared.size(), "table: numbers", own.size(),
-              "give as many to every object as to all together");
+      check(own.size() == table->shared.size(), "table: numbers", own.size(),
+            "give as many to every object as to all together");
       require_sound(*table, own);
     }
   }

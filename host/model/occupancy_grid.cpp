@@ -9,6 +9,7 @@
 #include <glm/vector_relational.hpp>
 
 #include "model/bounding_box.hpp"
+#include "model/refuse.hpp"
 #include "palpate/estimate.hpp"
 #include "palpate/pose_error.hpp"
 
@@ -133,6 +134,7 @@ std::optional<std::string> fault_of_cells(const OccupancyGrid& map, std::size_t 
 }
 
 OccupancyGrid mirror_image(const OccupancyGrid& map) {
+  require_sound_map(map);
   OccupancyGrid image = map;
   image.source.reset();  // its touches are of the side that was learned
   image.origin_mm.x = 0.0 - map.centre_mm(map.nx - 1, 0).x;

@@ -8,11 +8,12 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 
 namespace palpate {
 
 Body body_of(const OccupancyGrid& map) {
+  require_sound_map(map);
   glm::dvec2 sum{0.0};
   std::int64_t cells = 0;
   const auto for_each_occupied = [&map](const auto& visit) {
@@ -29,10 +30,9 @@ Body body_of(const OccupancyGrid& map) {
     ++cells;
   });
   if (cells == 0) {
-    throw Error(Fault::input,
-                fmt::format("map '{}': no cell has log odds above 0, so no pose error can be "
-                            "measured; map touches that meet the object",
-                            map.label));
+    refuse(fmt::format("map '{}'", map.label),
+           "no cell has log odds above 0, so no pose error can be measured; map touches that meet "
+           "the object");
   }
   Body body{.centroid_mm = sum / static_cast<double>(cells)};
   // A second pass about the centroid does not cancel when the object is far from the origin.

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 
 namespace palpate {
 
@@ -69,32 +69,29 @@ double value_of_level(double level, const ReadingLayer& settings) {
 
 void ReadingLayer::validate() const {
   if (!(near_mm >= 0.0 && near_mm <= far_mm && far_mm <= most_length_mm)) {
-    throw Error(Fault::input,
-                fmt::format("unseen cells: near {} mm and far {} mm: give ascending ones from 0",
-                            near_mm, far_mm));
+    refuse("unseen cells", "near {} mm and far {} mm: give ascending ones from 0", near_mm, far_mm);
   }
   if (!(unit_level > 0.0 && std::isfinite(unit_level) && full_level > 0.0 &&
         std::isfinite(full_level))) {
-    throw Error(Fault::input, fmt::format("mean level: unit {} and full {}: give positive numbers",
-                                          unit_level, full_level));
+    refuse("mean level", "unit {} and full {}: give positive numbers", unit_level, full_level);
   }
 }
 
 OccupancyGrid reading_layer(const OccupancyGrid& map, const ReadingLayer& settings) {
   settings.validate();
+  require_sound_map(map);
   if (settings.of == MapLayer::mean_level && map.mean_level.empty()) {
-    throw Error(Fault::input,
-                fmt::format("map '{}': no mean level, which the sensor model compares readings "
-                            "with; build it with palpate map `sensor-model`",
-                            map.label));
+    refuse(fmt::format("map '{}'", map.label),
+           "no mean level, which the sensor model compares readings with; build it with palpate "
+           "map `sensor-model`");
   }
   const auto border = static_cast<std::int64_t>(std::ceil(settings.far_mm / map.cell_mm)) + 1;
   const std::int64_t nx = map.nx + 2 * border;
   const std::int64_t ny = map.ny + 2 * border;
   if (nx > most_cells / ny) {
-    throw Error(Fault::input, fmt::format("map '{}': {} x {} cells with the {} mm around them are "
-                                          "too many; use larger cells",
-                                          map.label, map.nx, map.ny, settings.far_mm));
+    refuse(fmt::format("map '{}'", map.label),
+           "{} x {} cells with the {} mm around them are too many; use larger cells", map.nx,
+           map.ny, settings.far_mm);
   }
   OccupancyGrid layer = map;
   layer.prior = probability_from_log_odds(ReadingLayer::beyond);

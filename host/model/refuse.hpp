@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cmath>
 #include <filesystem>
 
 #include <fmt/format.h>
 
 #include "palpate/error.hpp"
+#include "palpate/occupancy_grid.hpp"
+#include "palpate/pose.hpp"
 
 namespace palpate {
 
@@ -20,6 +23,26 @@ template <typename... Parts>
 inline void require(bool sound, const char* name, double value, const char* remedy) {
   if (!sound) {
     throw Error(Fault::input, fmt::format("{} = {}: {}", name, value, remedy));
+  }
+}
+
+inline bool is_finite(const Pose& pose) {
+  return std::isfinite(pose.translation_mm.x) && std::isfinite(pose.translation_mm.y) &&
+         std::isfinite(pose.theta_rad);
+}
+
+inline void require_finite(const Pose& pose) {
+  if (!is_finite(pose)) {
+    throw Error(Fault::input,
+                fmt::format("pose {}, {}, {}: give finite numbers", pose.translation_mm.x,
+                            pose.translation_mm.y, pose.theta_rad));
+  }
+}
+
+/// Throws Error, "map '<label>': <fault>", where a map is not sound.
+inline void require_sound_map(const OccupancyGrid& map) {
+  if (const auto fault = fault_of(map)) {
+    throw Error(Fault::input, fmt::format("map '{}': {}", map.label, *fault));
   }
 }
 

@@ -9,6 +9,8 @@
 
 #include <glm/vec2.hpp>
 
+#include "model/refuse.hpp"
+
 namespace palpate {
 
 namespace {
@@ -24,6 +26,7 @@ struct Occupied {
 
 Occupied occupied_cells(const OccupancyGrid& map) {
   constexpr double most_samples = 4096.0;
+  require_sound_map(map);
   Occupied occupied;
   std::int64_t crossings = 0;
   const auto is_occupied = [&](int i, int j) {

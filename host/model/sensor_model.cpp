@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 #include "palpate/map_builder.hpp"
 #include "palpate/occupancy_grid.hpp"
 
@@ -12,20 +12,19 @@ namespace palpate {
 
 void InverseSensorModel::validate() const {
   if (!(spread_mm >= least_length_mm && spread_mm <= most_length_mm)) {
-    throw Error(Fault::input, fmt::format("spread = {} mm: give {:g} to {:g} mm", spread_mm,
-                                          least_length_mm, most_length_mm));
+    refuse(fmt::format("spread = {} mm", spread_mm), "give {:g} to {:g} mm", least_length_mm,
+           most_length_mm);
   }
   // Outside these bounds, increments in float32 miss the tolerance of MapBuilder::build().
   constexpr double largest_peak = 0.9999;
   if (!(peak >= least_peak && peak <= largest_peak)) {
-    throw Error(Fault::input,
-                fmt::format("peak = {}: must be at least {:g}, or a reading would say nothing, and "
-                            "at most {}, or a reading would make a cell certain",
-                            peak, least_peak, largest_peak));
+    refuse(fmt::format("peak = {}", peak),
+           "must be at least {:g}, or a reading would say nothing, and at most {}, or a reading "
+           "would make a cell certain",
+           least_peak, largest_peak);
   }
   if (!(prior >= least_prior && prior <= 1.0 - least_prior)) {
-    throw Error(Fault::input, fmt::format("prior = {}: must lie between {:g} and 1 - {:g}", prior,
-                                          least_prior, least_prior));
+    refuse(fmt::format("prior = {}", prior), "must lie between {0:g} and 1 - {0:g}", least_prior);
   }
 }
 

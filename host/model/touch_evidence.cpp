@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "model/bounding_box.hpp"
+#include "model/refuse.hpp"
 
 namespace palpate {
 
@@ -69,6 +70,13 @@ double array_reach_mm(std::span<const glm::dvec2> elements_mm) {
 
 Touch Recording::touch(std::size_t i) const {
   const std::size_t e = elements();
+  const auto of_array = [&](std::size_t count) { return count == e || count == size() * e; };
+  if (i >= size() || pressure.size() != size() * e || !of_array(elements_mm.size()) ||
+      !(valid.empty() || of_array(valid.size()))) {
+    refuse("recording",
+           "touch {} of {} poses, {} pressures, {} elements and {} valid; make them agree", i,
+           size(), pressure.size(), elements_mm.size(), valid.size());
+  }
   // An array that changes, or elements that die on the way, have a row per touch.
   const auto row = [&](const auto& values) {
     return std::span(values).subspan(values.size() == e ? 0 : i * e, e);
@@ -81,7 +89,7 @@ Touch Recording::touch(std::size_t i) const {
 
 std::vector<Touch> Recording::touches(std::size_t begin, std::size_t end) const {
   std::vector<Touch> views;
-  views.reserve(end - begin);
+  views.reserve(size());
   for (std::size_t i = begin; i < end; ++i) {
     views.push_back(touch(i));
   }

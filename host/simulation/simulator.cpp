@@ -224,6 +224,7 @@ Recording Simulator::touch(const std::vector<Pose>& T_robot_sensor, const Pose& 
   recording.time_s.reserve(T_robot_sensor.size());
   for (const Pose& pose : T_robot_sensor) {
     const Pose T_object_sensor = T_object_robot * pose;
+    require_finite(T_object_sensor);
     const double force_kpa =
         model.pressure_kpa * random_factor(simulator.random, model.force_spread);
     for (std::size_t i = 0; i < e; ++i) {
@@ -253,9 +254,7 @@ std::vector<Pose> training_grid() {
 }
 
 std::vector<Pose> random_poses(int n, std::uint64_t seed) {
-  if (n < 0) {
-    refuse(fmt::format("number of random poses = {}", n), "give zero or more");
-  }
+  require(n >= 0, "number of random poses", n, "give zero or more");
   Random random(seed, Stream::touch_poses);
   std::vector<Pose> poses(n);
   for (Pose& pose : poses) {

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "palpate/error.hpp"
+#include "model/own_process.hpp"
 #include "palpate/pose_track.hpp"
 #include "streaming/stream_lines.hpp"
 
@@ -46,7 +46,7 @@ struct PosedSensor::Impl {
 
   Impl(std::unique_ptr<Sensor> inner, const std::string& name, double largest_gap_s,
        const Warn& warn)
-      : sensor(std::move(inner)),
+      : sensor((held_by(inner, "sensor"), std::move(inner))),
         track(largest_gap_s),
         flaws(warn ? Warn([warn](const std::string& text) { warn("poses " + text); }) : warn),
         lines("poses", name, longest_line,

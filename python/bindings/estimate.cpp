@@ -219,7 +219,7 @@ void require_reach(const PoseLattice& lattice, double extent_mm, std::span<const
     if (glm::length(middle) > reach_mm) {
       throw Error(
           Fault::input,
-          fmt::format("lattice: missing or the default, within 10 mm of the robot's "
+          fmt::format("lattice or region: missing or the default, within 10 mm of the robot's "
                       "origin, but the array touches at ({:.1f}, {:.1f}) mm, where no object "
                       "can be then; give one of touch_region() or balanced_lattice() and "
                       "move_pivot() to the touch, or use recognize()",

@@ -26,13 +26,14 @@ namespace {
 /// A filter over object and pose.
 template <typename Filter>
 struct Named : Shared<Filter> {
-  std::string text;        ///< "PoseHistogram(A, E, I on 'llvmpipe')"
-  double extent_mm = 0.0;  ///< farthest occupied place of any map from its object frame's origin
+  std::string text;         ///< "PoseHistogram(A, E, I on 'llvmpipe')"
+  double extent_mm = 0.0;   ///< farthest occupied place of any map from its object frame's origin
+  PoseLattice region = {};  ///< as it was given
 };
 
 template <typename Filter, typename Options>
 Named<Filter> make_filter(const char* name, const std::shared_ptr<Device>& device, nb::handle maps,
-                          const Options& options) {
+                          const Options& options, const PoseLattice& region) {
   const std::vector<Hypothesis> hypotheses = hypotheses_of(maps);
   const auto labels = column(hypotheses, [](const Hypothesis& each) { return each.map.label; });
   auto filter = make_shared_on(device, [&](Device& on) {
@@ -44,7 +45,7 @@ Named<Filter> make_filter(const char* name, const std::shared_ptr<Device>& devic
   });
   return {std::move(filter),
           fmt::format("{}({} on '{}')", name, fmt::join(labels, ", "), device->name()),
-          extent_mm(hypotheses)};
+          extent_mm(hypotheses), region};
 }
 
 template <typename Filter>
@@ -53,6 +54,8 @@ void update(const Named<Filter>& self, const TouchesLike& touches, const Progres
   self.use(progress, [&](Filter& filter, const Report& report) {
     if constexpr (requires { filter.lattice(); }) {
       require_reach(filter.lattice(), self.extent_mm, views.touches);
+    } else {
+      require_reach(self.region, self.extent_mm, views.touches);
     }
     filter.update(views.touches, report);
   });
@@ -140,8 +143,8 @@ void bind_histogram(nb::module_& module) {
                                                .none_weight = none_weight,
                                                .touch_sd = sd_of(touch_sd, "touch_sd"),
                                                .slip_sd = sd_of(slip_sd, "slip_sd")};
-                new (self)
-                    Histogram(make_filter<PoseHistogram>("PoseHistogram", device, maps, options));
+                new (self) Histogram(
+                    make_filter<PoseHistogram>("PoseHistogram", device, maps, options, lattice));
               },
               "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
               "contact"_a = ContactModel{}, "none_weight"_a = nb::none(),
@@ -213,8 +216,8 @@ void bind_particles(nb::module_& module) {
                                           .alpha_slow = alpha_slow,
                                           .alpha_fast = alpha_fast,
                                           .seed = seed};
-            new (self)
-                Particles(make_filter<ParticleFilter>("ParticleFilter", device, maps, options));
+            new (self) Particles(
+                make_filter<ParticleFilter>("ParticleFilter", device, maps, options, region));
           },
           "device"_a, "maps"_a, "region"_a = PoseLattice{}, nb::kw_only(),
           "particles"_a = usual.particles, "contact"_a = usual.contact,
@@ -274,8 +277,8 @@ void bind_bounded(nb::module_& module) {
                                              .none_weight = none_weight,
                                              .threads = threads,
                                              .cancel_point = check_signals};
-                new (self) Bounded(
-                    make_filter<BoundedPosterior>("BoundedPosterior", device, maps, options));
+                new (self) Bounded(make_filter<BoundedPosterior>("BoundedPosterior", device, maps,
+                                                                 options, lattice));
               },
               "device"_a, "maps"_a, "lattice"_a = PoseLattice{}, nb::kw_only(),
               "contact"_a = ContactModel{}, "tolerance"_a = BoundedOptions{}.tolerance,

@@ -13,6 +13,7 @@
 #include <nanobind/stl/variant.h>
 
 #include "bindings.hpp"
+#include "io/recording_rules.hpp"
 #include "model/option_words.hpp"
 #include "options/option.hpp"
 #include "palpate/error.hpp"
@@ -105,6 +106,16 @@ nb::object items_of(nb::handle given) {
   return call("builtins", "list", is_one ? nb::make_tuple(given) : nb::borrow(given));
 }
 
+/// The path of an item of an argument. Throws TypeError where the item is none.
+std::string path_in(nb::handle item, const char* argument, const char* wanted) {
+  if (!is_path(item.ptr())) {
+    throw nb::type_error(
+        fmt::format("{}: holds a {}; give {}", argument, nb::inst_name(item).c_str(), wanted)
+            .c_str());
+  }
+  return nb::borrow<PathLike>(item).text();
+}
+
 }  // namespace
 
 nb::object to_python(const nlohmann::ordered_json& json) {
@@ -147,7 +158,7 @@ void add_maps(nb::handle given, Request& request) {
     if (const auto hypothesis = hypothesis_in(item)) {
       request.given_maps.push_back({fmt::format("map '{}'", hypothesis->map.label), *hypothesis});
     } else {
-      request.maps.push_back(nb::borrow<PathLike>(item).text());
+      request.maps.push_back(path_in(item, "maps", "OccupancyGrid, Hypothesis or files"));
     }
   }
   if (!request.given_maps.empty()) {
@@ -172,8 +183,9 @@ std::vector<Recording> recordings_of(nb::handle given) {
       if (copy.path.empty()) {
         copy.path = fmt::format("recordings[{}]", recordings.size() - 1);
       }
+      require_head(copy.path, copy, copy.elements());
     } else {
-      files.push_back(nb::borrow<PathLike>(item).text());
+      files.push_back(path_in(item, "recordings", "Recordings or files"));
       recordings.emplace_back();
     }
   }

@@ -118,7 +118,7 @@ def _draw_touches(recording: Recording, ax: "Axes") -> None:
         recording.elements_mm, (len(recording), *recording.elements_mm.shape[-2:])
     )
     poses = numpy.nan_to_num(recording.T_robot_sensor)
-    places = numpy.concatenate([transform(*one) for one in zip(poses, arrays, strict=True)])
+    places = numpy.reshape([transform(*one) for one in zip(poses, arrays, strict=True)], (-1, 2))
     pressure = recording.pressure.ravel()
     order = numpy.argsort(pressure)  # the largest on top; NaN, which is last, is not drawn
     x, y = places[order].T

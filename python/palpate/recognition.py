@@ -139,7 +139,7 @@ def import_request(
     """What an import is asked; an array that is no text, path or grid is the elements' centres."""
     texts = dict(options)
     array = texts.pop("array")
-    if isinstance(array, tuple) and len(array) == 3 and isinstance(array[0], int):
+    if isinstance(array, (tuple, list)) and len(array) == 3 and not isinstance(array[0], Iterable):
         texts["array"] = ":".join(map(str, array))
     elif isinstance(array, (str, bytes, os.PathLike)):
         texts["array"] = array

@@ -36,6 +36,11 @@ foreach(header IN LISTS headers)
   endif()
 endforeach()
 
+# No header, program or example raises a warning.
+string(APPEND FLAGS " -Wall -Wextra -Wconversion -Werror")
+run(${COMPILER} -std=c++20 -Wconversion -Wsign-conversion -Werror -I${prefix}/include
+    -include palpate/palpate.hpp -include palpate/driver.hpp -x c++ -fsyntax-only /dev/null)
+
 # Sanitizers work in the library only if the program is built with them, which takes a third of the time
 # where nothing is optimised.
 if(SANITIZE)

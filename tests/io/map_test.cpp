@@ -117,6 +117,7 @@ TEST_F(MapFile, ShowsMapServerWhatIsOccupiedFreeAndUnknown) {
   EXPECT_EQ(bytes_of(folder_ / "A.yaml"),
             "image: A.pgm\nmode: trinary\nresolution: 0.0005\norigin: [-0.00375, 0.01175, 0]\n"
             "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n");
+  input_error([&] { write_map_server(folder_ / "A.yaml", OccupancyGrid{.nx = 9, .ny = 9}); });
   expect_named(input_error([&] { write_map_server(folder_ / "A.pgm", small_map()); }),
                {"A.pgm", ".yaml"});
 }

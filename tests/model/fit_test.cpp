@@ -82,6 +82,9 @@ TEST_F(FitByHand, RefusesWhatIsNotSound) {
   input_error([&] { fit({10.0, infinity}); });
   EXPECT_NO_THROW(fit({10.0}, three_levels(2), 1));
   input_error([&] { fit({10.0}, three_levels(2), 2); });
+  input_error([&] { fit({10.0}, {.gamma = nan}); });
+  input_error([&] { fit_of({}, {{nan, 0.0}, 0.0}, map_, {}); });
+  input_error([&] { fit_of({}, {}, map_, {}, {.mm = -1.0}); });
 }
 
 /// Contact models of every kind.

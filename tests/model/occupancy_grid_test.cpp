@@ -5,8 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/learned_sensor.hpp"
 #include "palpate/map_builder.hpp"
-#include "palpate/occupancy_grid.hpp"
+#include "palpate/pose_error.hpp"
 #include "reference/reference.hpp"
 #include "support/errors.hpp"
 #include "support/limits.hpp"
@@ -74,6 +75,15 @@ TEST(FaultOfAMap, NamesCellsThatDoNotAgreeOrAreTooMany) {
                "at most 1073741824");
 }
 
+TEST(FaultOfAMap, IsSaidByWhateverReadsItsCells) {
+  OccupancyGrid map{.label = "A\nB", .nx = 400, .ny = 2, .log_odds = {1, 2, 3}};
+  for (const std::function<void()>& use : std::initializer_list<std::function<void()>>{
+           [&] { mirror_image(map); }, [&] { centre_frame(map); }, [&] { measure_symmetry(map); },
+           [&] { reading_layer(map, {}); }, [&] { fit_of({}, {}, map, {}); }}) {
+    EXPECT_EQ(input_error(use), "map 'A B': 400 x 2 cells but 3 log odds; make them agree");
+  }
+}
+
 constexpr Reading in = Reading::in_contact;
 constexpr Reading no = Reading::no_contact;
 
@@ -124,7 +134,6 @@ TEST(InverseSensorModel, RefusesWhatIsOutOfRange) {
     const std::string said = input_error([&] { model.validate(); });
     EXPECT_TRUE(said.starts_with(field)) << said;
   };
-  InverseSensorModel().validate();
   for (const double spread : {0.0, -1.0, nan, infinity}) {
     expect_refused({.spread_mm = spread}, "spread");
   }

@@ -192,6 +192,7 @@ TEST(PoseLattice, BinsOfAllDimensionsMayExceed32Bits) {
 
 void expect_refused(const PoseLattice& lattice, const char* field) {
   expect_named(input_error([&] { lattice.validate(); }), {field});
+  expect_named(input_error([&] { lattice.bin_of({}); }), {field});
 }
 
 TEST(PoseLattice, RefusesWhatIsNoLattice) {
@@ -199,6 +200,8 @@ TEST(PoseLattice, RefusesWhatIsNoLattice) {
   PoseLattice{.x_mm = {-1e9, 1e9, 5}, .theta_rad = {1e9 - 1.0, 1e9, 5}, .pivot_mm = {1e9, -1e9}}
       .validate();
   expect_refused({.x_mm = {-1.0, 1.0, 0}}, "x_mm");
+  input_error([] { PoseLattice().T_object_robot(std::int64_t{10'000}); });
+  input_error([] { PoseLattice{.x_mm = {-1.0, 1.0, 0}}.T_object_robot(std::int64_t{0}); });
   expect_refused({.y_mm = {-1.0, 1.0, -3}}, "y_mm");
   expect_refused({.theta_rad = {1.0, 0.0, 4}}, "theta_rad");
   // Float64 keeps no digits beyond 1e9.

@@ -57,6 +57,14 @@ TEST(Recording, ViewsTouchesOfAnArrayThatStays) {
   EXPECT_EQ(touches[0].pressure[0], 2.0);
   EXPECT_EQ(touches[1].pressure[0], 4.0);
   EXPECT_TRUE(r.touches(2, 2).empty());
+  input_error([&] { r.touches(0, 4); });
+  for (const std::size_t list : {0U, 1U, 2U}) {
+    Recording other = r;  // of lists that disagree
+    other.pressure.resize(list == 0 ? 5 : 6);
+    other.elements_mm.resize(list == 1 ? 1 : 2);
+    other.valid.resize(list == 2 ? 1 : 0);
+    expect_named(input_error([&] { other.touch(0); }), {"touch 0 of 3 poses"});
+  }
 }
 
 TEST(Recording, ViewsTheRowOfAnArrayAndOfDeadElementsThatChange) {

@@ -69,8 +69,6 @@ def test_what_is_no_drawing_is_refused() -> None:
         (from_mask, mask * 1.0, pixels, "mask: dtype float64; give booleans, True where occupied"),
         (from_mask, mask * numpy.uint8(255), pixels, "mask: dtype uint8; give booleans, True where occupied"),
         (from_mask, mask[0], pixels, "mask: shape (5,); give (rows, columns)"),
-        (from_mask, ~mask, pixels, "mask of 'a': no pixel is occupied; mark those of the object"),
-        (from_mask, mask, {**pixels, "felt_share": 0.0}, "felt_share=0: must lie between 0 and 1"),
         (from_polygon, [(0, 0), (1, 1)], {}, "polygon 0 of 2 vertices: give at least 3"),
         (from_polygon, 3, {}, "polygon: shape (); give (n, 2)"),
     ]

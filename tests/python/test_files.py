@@ -51,18 +51,6 @@ def test_a_map_of_arrays_holds_the_layers_that_are_given(maps: Maps) -> None:
     assert "prior" in error_of(palpate.OccupancyGrid, "A", cells, cell_mm=0.5, origin_mm=(0, 0), prior=1.5)
 
 
-def test_files_that_cannot_be_read_or_written_are_named(tmp_path: pathlib.Path) -> None:
-    text = tmp_path / "text.h5"
-    text.write_text("no HDF5")
-    for use, path, words in (
-        (palpate.read_recording, tmp_path / "missing.h5", ": "),
-        (palpate.read_map, text, ": is not an HDF5 file"),
-        (palpate.simulate("A").save, tmp_path / "no_folder" / "a.h5", ": "),
-    ):
-        said = error_of(use, path)
-        assert said.startswith(f"{path}{words}") and "\n" not in said
-
-
 @pytest.mark.parametrize("form", [str, os.fsencode, pathlib.Path])
 def test_names_of_files_need_not_be_utf8(
     form: Callable[[str], Any], tmp_path: pathlib.Path, device: palpate.Device,

@@ -2,6 +2,7 @@
 
 import json
 import pathlib
+from typing import Any
 
 import numpy
 from conftest import built, command, error_of
@@ -45,8 +46,9 @@ def test_frames_of_objects(device: palpate.Device) -> None:
     assert numpy.allclose(grid.T_learned_robot_object[:2], [600, 100], atol=3)
     assert numpy.allclose(origin - grid.origin_mm, grid.T_learned_robot_object[:2])
     # A histogram about the robot's origin would answer nothing; recognize() finds the object.
-    belief = palpate.PoseHistogram(device, [grid])
-    assert "lattice: missing or the default" in error_of(belief.update, far[:1])
+    for filter in (palpate.ParticleFilter, palpate.PoseHistogram):
+        belief: Any = filter(device, [grid])
+        assert "lattice or region: missing or the default" in error_of(belief.update, far[:1])
     belief.move_pivot(far.T_robot_sensor[0, :2])
     belief.update(far[:1])
     [record] = palpate.recognize(far[:9], grid, device=device)

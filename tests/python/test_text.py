@@ -61,6 +61,7 @@ def test_pictures_are_of_maps_beliefs_and_records(
     left, right, bottom, top = drawn(maps[0]).get_images()[0].get_extent()
     assert right - left == pytest.approx(maps[0].nx * maps[0].cell_mm)
     assert (left + 0.25, bottom + 0.25) == pytest.approx(tuple(maps[0].origin_mm))
+    assert len(drawn(unknown[:0]).collections) == 1, "of no touch"
     [points] = drawn(unknown).collections
     assert len(points.get_offsets()) == unknown.pressure.size
     for line, radius in zip(drawn(record).lines[1:3], (1.515, 2.448), strict=True):

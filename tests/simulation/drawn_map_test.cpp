@@ -93,7 +93,7 @@ TEST(DrawnMap, RefusesWhatMakesNoMap) {
   const std::pair<const char*, Mask> of_masks[] = {
       {"a pixel = nan mm", {.pixel_mm = nan}},
       {"1 pixels in 2 rows of 2", {.rows = 2, .columns = 2, .occupied = {1}}},
-      {"no pixel is occupied", {.rows = 1, .columns = 1, .occupied = {0}}},
+      {"no pixel of 1 mm is occupied", {.rows = 1, .columns = 1, .occupied = {0}}},
       {"origin = nan,0 mm", {.origin_mm = {nan, 0.0}, .rows = 1, .columns = 1, .occupied = {1}}},
       {"an origin nearer", {.origin_mm = {1e9, 0.0}, .rows = 1, .columns = 1, .occupied = {1}}}};
   for (const auto& [named, mask] : of_masks) {

@@ -261,6 +261,7 @@ TEST(Simulator, RefusesWhatItCannotSimulateNamingTheField) {
   expect_refused("element_mm", {.element_mm = 0.0});
   expect_refused("pressure_kpa", {.pressure_kpa = 0.0});
   expect_refused("array", {}, {});
+  input_error([] { Simulator(plate(), {}, digitacts_array(), 1).touch({unknown_pose}, {}); });
   expect_refused("element 0", {}, {{0.0, nan}});
 
   Shape unbounded = plate();

@@ -150,12 +150,8 @@ TEST_F(PoseSource, FileWithABadLineIsRefusedByNumber) {
   const std::string two = lines(0, 1) + "\n";
   const std::pair<std::string, const char*> files[] = {
       {two + "nonsense\n" + lines(2, 3), "line 3: is no JSON object"},
-      {two + "[1, 2]\n", "line 3: is no JSON object"},
       {two + "{\"time\": 1}\n", "line 3: has no number 'x_mm'"},
-      {two + "time,x_mm,y_mm,theta_rad\n", "line 3: has no number 'time'"},
       {two + "{\"x_mm\": 1, \"y_mm\": 1, \"theta_rad\": 1}\n", "line 3: has no number 'time'"},
-      {two + "{\"time\": 1, \"x_mm\": \"1\", \"y_mm\": 1, \"theta_rad\": 1}\n",
-       "line 3: has no number 'x_mm'"},
       {two + "{\"time\": 1, \"x_mm\": 1, \"y_mm\": 1e999, \"theta_rad\": 1}\n", "line 3"},
       {lines(0, 2) + line(1.0, 1.0), "line 3: time = 1 s is not later"},
       {lines(0, 4) + line(1000.0 * time_of(4), 4) + lines(5, 10), "line 5: time = 1700000000040 s"},
@@ -174,6 +170,7 @@ TEST_F(PoseSource, FileWithABadLineIsRefusedByNumber) {
 }
 
 TEST_F(PoseSource, WhatCannotBeReadIsRefused) {
+  input_error([&] { PosedSensor(nullptr, "-"); });
   expect_named(input_error([&] { open(); }), {"poses", "cannot be read"});
   std::filesystem::create_directory(path_);
   expect_named(input_error([&] { open(); }), {"poses", "folder"});

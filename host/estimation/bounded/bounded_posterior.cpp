@@ -184,7 +184,7 @@ RefinedPose BoundedPosterior::refine(const Mode& mode) const {
   Mode start = mode;
   if (fit.plane() != lattice().plane()) {
     of_fit.emplace(belief.hypotheses(), belief.options().contact, fit);
-    if (mode.bin && *mode.bin >= 0 && *mode.bin < lattice().bins()) {
+    if (mode.bin) {
       start.bin = fit.bin_of(lattice().T_object_robot(*mode.bin));
     }
   }
@@ -247,12 +247,7 @@ EvaluatedBelief BoundedPosterior::evaluated_bins() const {
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
   const BoundedBelief& belief = with_touches_taken_in();
   require_object(object, belief.hypotheses().size());
-  const auto& [translation_mm, theta_rad] = T_object_robot;
-  if (!std::isfinite(translation_mm.x) || !std::isfinite(translation_mm.y) ||
-      !std::isfinite(theta_rad)) {
-    throw Error(Fault::input, fmt::format("pose {}, {}, {}: give finite numbers", translation_mm.x,
-                                          translation_mm.y, theta_rad));
-  }
+  require_finite(T_object_robot);
   const KnownElements& elements = belief.elements();
   if (!belief.options().touch_sd.none()) {
     const std::int64_t bin = lattice().bin_of(T_object_robot);

@@ -9,11 +9,12 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "estimation/displacement_weights.hpp"
 #include "estimation/hypotheses.hpp"
 #include "estimation/lattice/refinement.hpp"
 #include "gpu/command_stream.hpp"
 #include "model/bounding_box.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 
 namespace palpate {
 
@@ -63,6 +64,8 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
     axis->count = 1;
   }
   lattice.validate();
+  validate_displacement(touch_sd, lattice, "touch_sd");
+  validate_displacement(slip_sd, lattice, "slip_sd");
   double wanted_mm = std::numeric_limits<double>::infinity();
   double longest_mm = 0.0;
   for (const Hypothesis& hypothesis : hypotheses) {
@@ -106,8 +109,7 @@ BalancedLattice balanced_lattice(const PoseLattice& region, std::span<const Hypo
 TouchRegion touch_region(std::span<const Hypothesis> hypotheses, double reach_mm) {
   validate_hypotheses(hypotheses);
   if (!(reach_mm >= 0.0 && reach_mm <= farthest_mm)) {
-    throw Error(Fault::input,
-                fmt::format("reach of the array = {} mm: give 0 to {:g}", reach_mm, farthest_mm));
+    refuse(fmt::format("reach of the array = {} mm", reach_mm), "give 0 to {:g}", farthest_mm);
   }
   BoundingBox all;
   glm::dvec2 largest_mm(0.0);

@@ -15,8 +15,8 @@
 
 #include "model/displacement_points.hpp"
 #include "model/random.hpp"
+#include "model/refuse.hpp"
 #include "model/touch_evidence.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -278,7 +278,6 @@ PredictedReadings::PredictedReadings(std::span<const Hypothesis> hypotheses,
 
 void require_plan(std::span<const Pose> T_robot_sensor, std::span<const glm::dvec2> elements_mm,
                   const PlanOptions& options, std::size_t objects) {
-  constexpr std::size_t most_samples = 4096;
   if (T_robot_sensor.empty()) {
     throw Error(Fault::input, "no candidate touches: give at least one pose");
   }
@@ -286,28 +285,23 @@ void require_plan(std::span<const Pose> T_robot_sensor, std::span<const glm::dve
     throw Error(Fault::input, "the candidates' array has no living element: give at least one");
   }
   for (std::size_t i = 0; i < T_robot_sensor.size(); ++i) {
-    const auto& [mm, rad] = T_robot_sensor[i];
-    if (!std::isfinite(mm.x) || !std::isfinite(mm.y) || !std::isfinite(rad)) {
-      throw Error(Fault::input,
-                  fmt::format("candidate {}: its pose [{}, {}, {}] is not finite; leave it out", i,
-                              mm.x, mm.y, rad));
+    if (const auto& [mm, rad] = T_robot_sensor[i]; !is_finite(T_robot_sensor[i])) {
+      refuse(fmt::format("candidate {}", i), "its pose [{}, {}, {}] is not finite; leave it out",
+             mm.x, mm.y, rad);
     }
   }
   for (std::size_t i = 0; i < elements_mm.size(); ++i) {
     const glm::dvec2& mm = elements_mm[i];
     if (!std::isfinite(mm.x) || !std::isfinite(mm.y)) {
-      throw Error(Fault::input, fmt::format("element {} of the candidates' array: [{}, {}] mm is "
-                                            "not finite; leave it out",
-                                            i, mm.x, mm.y));
+      refuse(fmt::format("element {} of the candidates' array", i),
+             "[{}, {}] mm is not finite; leave it out", mm.x, mm.y);
     }
   }
-  if (options.samples < 2 || options.samples > most_samples) {
-    throw Error(Fault::input,
-                fmt::format("samples = {}: give 2 to {}", options.samples, most_samples));
-  }
+  require(options.samples >= 2 && options.samples <= 4096, "samples",
+          static_cast<double>(options.samples), "give 2 to 4096");
   if (!options.label_of.empty() && options.label_of.size() != objects) {
-    throw Error(Fault::input, fmt::format("label_of: {} labels of {} objects; give one for each",
-                                          options.label_of.size(), objects));
+    refuse("label_of", "{} labels of {} objects; give one for each", options.label_of.size(),
+           objects);
   }
 }
 

@@ -19,7 +19,7 @@
 #include "estimation/log_sum.hpp"
 #include "gpu/command_stream.hpp"
 #include "model/own_process.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 
 namespace palpate {
 
@@ -210,10 +210,9 @@ PoseHistogram::PoseHistogram(Device& device, std::span<const Hypothesis> hypothe
   validate_displacement(checked.touch_sd, checked.lattice, "touch_sd");
   validate_displacement(checked.slip_sd, checked.lattice, "slip_sd");
   checked.contact = resolve(options.contact, hypotheses);
-  if (checked.none_weight && !(*checked.none_weight > 0.0 && std::isfinite(*checked.none_weight))) {
-    throw Error(Fault::input, fmt::format("none_weight = {}: give a positive number, or none",
-                                          *checked.none_weight));
-  }
+  const double none = checked.none_weight.value_or(1.0);
+  require(none > 0.0 && std::isfinite(none), "none_weight", none,
+          "give a positive number, or none");
   require_room(device.context(), checked, hypotheses.size());
   impl_ = {new Impl(device, hypotheses, checked), delete_here<Impl>};
 }

@@ -38,10 +38,7 @@ constexpr double least_curvature = 1e-3;
 /// The mode's bin, or the bin of its pose.
 BinIndex bin_of(const PoseLattice& lattice, const Mode& mode) {
   const std::int64_t bin = mode.bin ? *mode.bin : lattice.bin_of(mode.T_object_robot);
-  if (bin < 0 || bin >= lattice.bins()) {
-    throw Error(Fault::input,
-                fmt::format("bin {}: there are {}, counted from 0", bin, lattice.bins()));
-  }
+  static_cast<void>(lattice.T_object_robot(bin));  // throws where there is no such bin
   return {.x = static_cast<int>(bin % lattice.x_mm.count),
           .y = static_cast<int>(bin % lattice.plane() / lattice.x_mm.count),
           .theta = static_cast<int>(bin / lattice.plane())};

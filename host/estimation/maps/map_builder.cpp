@@ -13,7 +13,7 @@
 #include "model/bounding_box.hpp"
 #include "model/cell_range.hpp"
 #include "model/own_process.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 #include "shaders/accumulate_evidence.hpp"
 #include "shaders/interface.h"
 
@@ -312,10 +312,9 @@ OccupancyGrid MapBuilder::build(const std::string& label) {
   Impl& all = impl();
   all.change.refuse();
   if (all.seen.readings == 0) {
-    throw Error(Fault::input,
-                fmt::format("object '{}': no element of any touch is In Contact or No "
-                            "Contact; check the threshold and the pressure's unit",
-                            label));
+    refuse(fmt::format("object '{}'", label),
+           "no element of any touch is In Contact or No Contact; check the threshold and the "
+           "pressure's unit");
   }
   all.change.change([&] { all.flush(); });
   const MapOptions& options = all.options;
@@ -325,9 +324,7 @@ OccupancyGrid MapBuilder::build(const std::string& label) {
   for (const double sum : all.sums(range)) {
     map.log_odds.push_back(static_cast<float>(prior + sum));
   }
-  if (const auto fault = fault_of(map)) {
-    throw Error(Fault::input, fmt::format("map '{}': {}", label, *fault));
-  }
+  require_sound_map(map);
   return map;
 }
 

@@ -9,7 +9,7 @@
 
 #include "estimation/maps/left_out_fit.hpp"
 #include "model/cell_range.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 #include "palpate/map_builder.hpp"
 
 namespace palpate {
@@ -33,6 +33,9 @@ class AreaShare {
   }
 
   double share() const {
+    if (first_cell_mm_ == 0.0) {
+      throw Error(Fault::input, "no objects: give at least one");
+    }
     // Where nothing, or everything, was in contact, half a cell keeps the logs finite.
     const double fraction = (occupied_ + 0.5) / (modelled_ + 1.0);
     return std::clamp(fraction, least_prior, 1.0 - least_prior);
@@ -48,12 +51,12 @@ OccupancyGrid built(Device& device, const OccupancyGrid& map, double prior) {
   if (map.drawn) {
     OccupancyGrid same = map;
     same.prior = prior;
+    require_sound_map(same);
     return same;
   }
   if (!map.source) {
-    throw Error(Fault::input,
-                fmt::format("map '{}': it holds no touches to build it from again; build it anew",
-                            map.label));
+    refuse(fmt::format("map '{}'", map.label),
+           "it holds no touches to build it from again; build it anew");
   }
   MapOptions options = map.source->options;
   options.sensor.prior = prior;

@@ -41,7 +41,7 @@ struct BalancedLattice {
 /// are up to half a standard deviation of touches, or five quarters of what an object slips by,
 /// but at most 2.5 times as wide. An axis of zero extent gets one bin. Where all objects together
 /// would have more than `most_bins` bins, the steps of all axes grow by one factor.
-/// @throws Error on an empty list, a map that is not sound or a region that is out of range
+/// @throws Error on an empty list, a map that is not sound, and a region or sd out of range
 PALPATE_API BalancedLattice balanced_lattice(const PoseLattice& region,
                                              std::span<const Hypothesis> hypotheses,
                                              std::int64_t most_bins = most_balanced_bins,

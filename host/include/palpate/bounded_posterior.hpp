@@ -19,7 +19,7 @@
 namespace palpate {
 
 struct BoundedOptions {
-  PoseLattice lattice;
+  PoseLattice lattice = {};
   ContactModel contact = {};  ///< what the sensor says about a place (Eq. 3, 7)
   /// How far every touch's sensor may have been from where the robot says, as
   /// HistogramOptions::touch_sd: each touch's likelihood is its mean over these places.

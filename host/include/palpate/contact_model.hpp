@@ -30,9 +30,8 @@ struct PALPATE_API LikelihoodTable {
 
   /// Number of levels, No Contact included.
   std::size_t levels() const { return level_edges.size() + 2; }
-  /// 1 where all objects share the numbers, or else the number of objects. Only for a table that
-  /// validate() accepts.
-  std::size_t sets() const { return log_likelihood.size() / (levels() * nodes); }
+  /// 1 where all objects share the numbers, or else the number of objects; 0 without 2 nodes.
+  std::size_t sets() const { return nodes < 2 ? 0 : log_likelihood.size() / (levels() * nodes); }
   /// Throws Error unless there are 2 nodes or more, at least 0.001 nats apart and within 1000 nats;
   /// finite, ascending edges, of at most `most_reading_levels` levels; and finite numbers of at
   /// most 1e30 nats for every node of every level, of one set or several.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 
@@ -17,7 +18,8 @@ enum class Fault {
 /// line that names the file, the field, the value and the remedy as far as they are known.
 class PALPATE_API Error : public std::runtime_error {
  public:
-  Error(Fault fault, const std::string& message) : std::runtime_error(message), fault_(fault) {}
+  Error(Fault fault, std::string message)
+      : std::runtime_error((std::ranges::replace(message, '\n', ' '), message)), fault_(fault) {}
   Fault fault() const noexcept { return fault_; }
 
  private:

@@ -111,7 +111,8 @@ PALPATE_API FitScale pooled(std::span<const FitScale> objects);
 /// of theta in rad; by default none
 /// @param object index of the object whose numbers of a table are used
 /// @returns none where no element is known
-/// @throws Error on a touch that is not sound, or a table without numbers for the object
+/// @throws Error on a touch, map or contact model that is not sound, a pose that is not finite, or
+/// a table without numbers for the object
 PALPATE_API std::optional<Fit> fit_of(std::span<const Touch> touches, const Pose& T_object_robot,
                                       const OccupancyGrid& map, const ContactModel& contact,
                                       const DisplacementSd& touch_sd = {}, std::size_t object = 0);

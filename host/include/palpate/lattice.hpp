@@ -41,12 +41,13 @@ struct PALPATE_API PoseLattice {
   std::int64_t plane() const { return std::int64_t{x_mm.count} * y_mm.count; }
   std::int64_t bins() const { return plane() * theta_rad.count; }
   /// The pose at the centre of a bin; index order is theta, y, x, x fastest.
+  /// @throws Error where there is no such bin
   Pose T_object_robot(std::int64_t index) const;
   /// The pose at any (x, y, theta), in mm and radians.
   Pose T_object_robot(double x_mm, double y_mm, double theta_rad) const;
   /// The bin that a pose lies in, or the nearest bin where the pose is outside the region. Angles
   /// are compared modulo a full turn.
-  /// @throws Error on a pose that is not finite
+  /// @throws Error on a pose that is not finite, and as validate()
   std::int64_t bin_of(const Pose& T_object_robot) const;
 };
 

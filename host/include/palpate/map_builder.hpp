@@ -43,9 +43,9 @@ struct PALPATE_API InverseSensorModel {
 
 /// Resolution, sensor model and contact classifier of a map.
 struct PALPATE_API MapOptions {
-  double cell_mm = 0.5;       ///< edge of a cell
-  InverseSensorModel sensor;  ///< also holds the prior
-  ContactClassifier classifier;
+  double cell_mm = 0.5;            ///< edge of a cell
+  InverseSensorModel sensor = {};  ///< also holds the prior
+  ContactClassifier classifier = {};
 
   /// Throws Error on a cell size, spread, peak, prior, threshold or ratio out of range.
   void validate() const;

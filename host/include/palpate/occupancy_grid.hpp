@@ -74,7 +74,7 @@ struct OccupancyGrid {
   std::shared_ptr<const MapSource> source = {};
   std::string file = {};  ///< that read_map() read it from; "" of any other map
 
-  float at(int i, int j) const { return log_odds[static_cast<std::size_t>(j) * nx + i]; }
+  float at(int i, int j) const { return log_odds.begin()[std::ptrdiff_t{j} * nx + i]; }
   glm::dvec2 centre_mm(int i, int j) const { return origin_mm + cell_mm * glm::dvec2(i, j); }
   double prior_log_odds() const { return log_odds_from_probability(prior); }
 };
@@ -87,7 +87,7 @@ PALPATE_API OccupancyGrid mirror_image(const OccupancyGrid& map);
 /// them, finite and within `most_log_odds`; a cell and a spread within the bounds above; centres
 /// within `farthest_mm`; a spread no larger than the grid; a prior between 0 and 1; a symmetry of
 /// at least 0; a label other than `none_label`; and as many observations and mean levels as cells
-/// or none, all finite and at least 0. Files, MapBuilder and all filters refuse any other map.
+/// or none, all finite and at least 0. Files, filters and all that reads cells refuse others.
 PALPATE_API std::optional<std::string> fault_of(const OccupancyGrid& map);
 /// Checks a map like fault_of(), except its log odds, which it need not hold yet.
 PALPATE_API std::optional<std::string> fault_without_cells(const OccupancyGrid& map);

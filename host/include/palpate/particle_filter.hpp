@@ -24,7 +24,7 @@ struct ParticleOptions {
   int particles = 10'000;  ///< n, over all objects together; at most 1,000,000
   /// Particles start uniformly distributed over the ranges of this lattice, about its pivot; its
   /// bin counts are ignored.
-  PoseLattice region;
+  PoseLattice region = {};
   ContactModel contact = {};  ///< what the sensor says about a place (Eq. 3, 7)
   double motion_mm = 1.0;     ///< standard deviation of the noise added to x and y at each touch
   double motion_rad = 0.1;    ///< standard deviation of the noise added to theta at each touch

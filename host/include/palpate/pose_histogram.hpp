@@ -18,7 +18,7 @@
 namespace palpate {
 
 struct HistogramOptions {
-  PoseLattice lattice;
+  PoseLattice lattice = {};
   ContactModel contact = {};  ///< what the sensor says about a place (Eq. 3, 7)
   /// Prior weight W of "none of these", an object that was never learned, relative to the
   /// hypotheses' weights. Positive; by default "none of these" is left out.

@@ -55,7 +55,7 @@ inline std::size_t unknown_readings(const Frame& frame, std::span<const std::uin
   }
   std::size_t count = 0;
   for (std::size_t i = 0; i < frame.values.size(); ++i) {
-    count += (valid.empty() || valid[i] != 0) && !is_known(frame.values[i]) ? 1 : 0;
+    count += (valid.empty() || valid[i] != 0) && !is_known(frame.values[i]) ? 1U : 0U;
   }
   return count;
 }

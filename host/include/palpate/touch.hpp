@@ -101,10 +101,10 @@ struct PALPATE_API Recording {
   std::size_t size() const { return T_robot_sensor.size(); }
   /// Number of elements of the array, e.
   std::size_t elements() const { return size() == 0 ? 0 : pressure.size() / size(); }
-  /// Returns touch i < size() as a view into this recording, valid while the recording is
-  /// unchanged.
+  /// Returns touch i as a view into this recording, valid while the recording is unchanged.
+  /// @throws Error unless i < size(), and on lists whose sizes disagree
   Touch touch(std::size_t i) const;
-  /// Returns touches [begin, end), end <= size(), as such views.
+  /// Returns touches [begin, end) as such views.
   std::vector<Touch> touches(std::size_t begin, std::size_t end) const;
 };
 

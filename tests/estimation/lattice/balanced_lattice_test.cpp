@@ -138,6 +138,8 @@ TEST(BalancedLattice, FollowsUncertainTouchesUpToTwoAndAHalfSteps) {
   }
   const BalancedLattice fine = lattice({.mm = 9.0, .rad = 1.0}, {}, BinWidth::fine);
   EXPECT_EQ(fine.lattice.bins(), fine_lattice({}, letters()).lattice.bins()) << "for the mode";
+  expect_named(input_error([&] { lattice({.mm = std::nan("")}, {}); }), {"touch_sd mm = nan"});
+  expect_named(input_error([&] { lattice({}, {.rad = -1.0}); }), {"slip_sd rad = -1"});
 }
 
 TEST(BalancedLattice, FollowsTheRegionAndCollapsesWhatIsFixed) {
