@@ -20,9 +20,7 @@ class Picture {
   /// Colours a cell: from white at 0 to red at 1, and to blue at -1, in 16 steps each.
   void cell(int x, int y, double value) {
     const int step = static_cast<int>(std::lround(16.0 * std::clamp(value, -1.0, 1.0)));
-    if (step != 0) {
-      cells_[step] += "M" + std::to_string(x) + " " + std::to_string(rows_ - 1 - y) + "h1v1h-1z";
-    }
+    if (step != 0) cells_[step] << "M" << x << " " << rows_ - 1 - y << "h1v1h-1z";
   }
 
   void circle(double x, double y, double radius, const std::string& style) {
@@ -41,7 +39,7 @@ class Picture {
       const int full = 255 - 2 * std::abs(step);
       const int faded = 255 - 14 * std::abs(step);
       file << "<path fill=\"rgb(" << (step > 0 ? full : faded) << "," << faded << ","
-           << (step < 0 ? full : faded) << ")\" d=\"" << path_of_cells << "\"/>\n";
+           << (step < 0 ? full : faded) << ")\" d=\"" << path_of_cells.str() << "\"/>\n";
     }
     file << "</g>\n" << marks_.str() << "</svg>\n";
   }
@@ -49,7 +47,7 @@ class Picture {
  private:
   int columns_;
   int rows_;
-  std::map<int, std::string> cells_;
+  std::map<int, std::ostringstream> cells_;
   std::ostringstream marks_;
 };
 
