@@ -102,7 +102,7 @@ def test_candidates_that_are_no_poses_are_refused(files: Files, candidates: Any,
 
 def test_arguments_of_another_type_are_refused(files: Files, presses: list[pathlib.Path]) -> None:
     calls: list[tuple[Any, list[Any], dict[str, Any], str]] = [
-        (palpate.plan, [[files.unknown], files.maps], {}, "not list"),  # a plan is of one recording
+        (palpate.plan, [[files.unknown], files.maps], {}, "recordings: holds a list"),  # a plan is of one
         (palpate.plan, [files.unknown], {"each_frame": True}, "unexpected keyword argument 'each_frame'"),
         (palpate.calibrate, [presses], {"bins": "auto"}, "bins: 'auto'; give counts"),
         (palpate.learn_maps, [presses], {"cell_mm": "wide"}, r"^cell_mm: 'wide'; give float \| None"),

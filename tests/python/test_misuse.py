@@ -81,8 +81,6 @@ def test_what_a_path_raises_is_raised(tmp_path: pathlib.Path) -> None:
         for path, error in ((Raising(), ZeroDivisionError), (f"{tmp_path}/a\0b", ValueError), (3, TypeError)):
             with pytest.raises(error):
                 use(path)
-    with pytest.raises(TypeError, match="recordings: holds a .*Touch; give Recordings or files"):
-        palpate.recognize(list(RECORDING), ())  # type: ignore[arg-type]
 
 
 def test_a_proxy_to_what_is_gone_is_refused(belief: palpate.PoseHistogram, maps: Maps) -> None:
