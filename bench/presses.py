@@ -81,7 +81,7 @@ def program() -> None:
     rows: list[Json] = []
     widest = (REACH + 0.5) * pitch_of(recordings[0].elements_mm)
     region: Any = {"x_mm": (-widest, widest), "y_mm": (-widest, widest)}
-    region |= {"filter": "histogram", "bins": (TURNS, 2 * REACH + 1, 2 * REACH + 1)}
+    region |= {"filter": "histogram", "bins": (2 * REACH + 1, 2 * REACH + 1, TURNS)}
     raw = recordings[0].pressure_unit == "raw"
     contact = {"threshold": CLASSIFIER.threshold, "ratio": CLASSIFIER.ratio} if raw else {}
     models: Any = (("eq7", "Eq. 7", {**contact, "sensor_model": "none"}), ("learned", "learned", {}))
