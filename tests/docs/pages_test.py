@@ -22,7 +22,7 @@ def blocks_in(page: str) -> list[tuple[str, list[str]]]:
         if language == "sh":
             blocks.append((text, []))
         elif not language and blocks:
-            blocks[-1][1].extend(text.splitlines())
+            blocks[-1][1].extend(["...", *text.splitlines()])
     return blocks
 
 
@@ -43,6 +43,15 @@ def agree(quoted: str, printed: str) -> bool:
     if quoted == printed or not a or not b or a[3] != b[3]:
         return quoted == printed
     return abs(float(a[1]) - float(b[1])) < 1.5 * 10.0 ** -len(a[2])
+
+
+def runs_of(lines: list[str]) -> list[list[str]]:
+    """Lines with the indented ones below them, such as what else a table says of an unknown."""
+    runs: list[list[str]] = [[""]]
+    for line in lines:
+        runs += [] if line.startswith(" ") else [[]]
+        runs[-1].append(line)
+    return runs
 
 
 def holds(printed: list[str], quoted: list[str]) -> bool:
@@ -72,10 +81,13 @@ class Pages(CommandTest):
         self.assertEqual(run.returncode, 0, run.stderr)
         printed = zip(run.stdout.split(END_OF_BLOCK), run.stderr.split(END_OF_BLOCK), strict=True)
         for (_, quoted), texts in zip(blocks, printed, strict=False):
-            lines = [words_of(line) for line in "".join(texts).splitlines()]
-            for line in quoted:
-                if line != "..." and not any(holds(other, words_of(line)) for other in lines):
-                    self.fail(f"the commands above it do not print: {line}\nbut:\n{''.join(texts)}")
+            runs = [[words_of(line) for line in run] for run in runs_of("".join(texts).splitlines())]
+            for head, *below in runs_of(quoted)[1:]:
+                left_out = head == "..."
+                beside = [run for run in runs if left_out or holds(run[0], words_of(head))]
+                for line in below if left_out or below else [head]:
+                    if not any(holds(other, words_of(line)) for run in beside for other in run):
+                        self.fail(f"the commands above it do not print: {line}\nbut:\n{''.join(texts)}")
         return run.stdout.replace(END_OF_BLOCK, ""), run.stderr.replace(END_OF_BLOCK, "")
 
     def json(self, file: str) -> Any:
