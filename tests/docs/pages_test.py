@@ -65,7 +65,8 @@ class Pages(CommandTest):
 
     def run_page(self, page: str) -> tuple[str, str]:
         """Runs all blocks ```sh of a page, in their order, as one script that any failure ends, and
-        returns what they print and what they complain of. A line that is quoted and not printed fails."""
+        returns what they print and what they complain of. A line that is quoted and not printed fails, as
+        does an indented one that is not printed below the line that it is quoted below."""
         blocks = blocks_in((ROOT / "docs" / page).read_text())
         self.assertTrue(blocks, f"{page} has no commands")
         end = "printf '\\x1e'; printf '\\x1e' >&2\n"
