@@ -281,7 +281,7 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
 }
 
 std::uint64_t BinLikelihood::bytes() const {
-  std::uint64_t sum = form_.rows.capacity() * sizeof(double);
+  std::uint64_t sum = form_.table.log_likelihood.capacity() * sizeof(double);
   for (const PlacedMap& map : maps_) {
     sum += map.nodes.bytes();
   }
@@ -341,17 +341,17 @@ double BinLikelihood::undisplaced_error(std::size_t object, const KnownElements&
     // scale. Then the table's numbers, a product and a sum, and the sum over elements.
     double largest = 0.0;   // magnitude, in nats
     double steepest = 0.0;  // difference per nat of log odds
-    for (std::size_t reading = 0; reading < form_.readings; ++reading) {
-      const std::span of(form_.values(object, static_cast<Reading>(reading)), form_.nodes);
+    for (std::size_t reading = 0; reading < form_.table.levels(); ++reading) {
+      const std::span of = numbers_of(form_.table, static_cast<Reading>(reading), object);
       for (std::size_t i = 0; i < of.size(); ++i) {
         const double next = of[std::min(i + 1, of.size() - 1)];
         largest = std::max(largest, std::abs(of[i]));
         steepest = std::max(steepest, std::abs(next - of[i]) * form_.nodes_per_nat);
       }
     }
-    const double width = static_cast<double>(form_.nodes - 1) / form_.nodes_per_nat;
+    const double width = static_cast<double>(form_.table.nodes - 1) / form_.nodes_per_nat;
     const double argument =
-        log_odds + u * (map.largest + 2.0 * std::abs(form_.first_log_odds) + 4.0 * width);
+        log_odds + u * (map.largest + 2.0 * std::abs(form_.table.first_log_odds) + 4.0 * width);
     const double each =
         std::min(steepest * argument, 2.0 * largest) + (8.0 * u + u * count) * largest;
     return second_order * count * each;
