@@ -79,7 +79,7 @@ SortedParticles sort(std::span<const shaders::Particle> particles,
                        static_cast<std::uint32_t>(i)});
     }
   }
-  std::sort(order.begin(), order.end());
+  std::ranges::stable_sort(order, {}, [](const auto& of) { return of.first; });
   double mass = 0.0;
   for (const auto& [cell, i] : order) {
     const double weight = weights[i] / sorted.largest;

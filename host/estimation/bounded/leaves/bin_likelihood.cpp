@@ -46,14 +46,6 @@ struct AxisRun {
   }
 };
 
-/// Bins along an axis for each of the fewest equal parts that fit a block.
-int bins_per_part(int count, double step_cells) {
-  const double fit = step_cells > 0.0 ? std::floor(most_block_cells / step_cells) + 1.0 : 1e9;
-  const int limit = static_cast<int>(std::min<double>(most_block_bins, fit));
-  const int parts = (count + limit - 1) / limit;
-  return (count + parts - 1) / parts;
-}
-
 constexpr int side = BlockRun::side;
 
 /// The blocks of 4 x 4 bins that boxes of one object lie in, and sums for all of their bins.
@@ -158,14 +150,11 @@ void BinLikelihood::evaluate_on_this_thread(std::span<const BinBox> boxes,
                      map.reach_cells, map.grid, placed);
     }
     of = &box;
-    const int width = bins_per_part(box.x_count, lattice_.x_mm.step() / map.cell_mm);
-    const int height = bins_per_part(box.y_count, lattice_.y_mm.step() / map.cell_mm);
     for (int j = 0; j < box.y_count;) {
-      const AxisRun rows(lattice_.y_mm, box.y_first + j, std::min(height, box.y_count - j),
-                         map.origin_mm.y, map);
+      const AxisRun rows(lattice_.y_mm, box.y_first + j, box.y_count - j, map.origin_mm.y, map);
       for (int i = 0; i < box.x_count;) {
-        const AxisRun columns(lattice_.x_mm, box.x_first + i, std::min(width, box.x_count - i),
-                              map.origin_mm.x, map);
+        const AxisRun columns(lattice_.x_mm, box.x_first + i, box.x_count - i, map.origin_mm.x,
+                              map);
         for (int r = 0; r < rows.count; ++r) {
           for (int c = 0; c < columns.count; ++c) {
             bins.x_offset.push_back(columns.offset[c]);
