@@ -106,7 +106,6 @@ nb::object items_of(nb::handle given) {
   return call("builtins", "list", is_one ? nb::make_tuple(given) : nb::borrow(given));
 }
 
-/// The path of an item of an argument. Throws TypeError where the item is none.
 std::string path_in(nb::handle item, const char* argument, const char* wanted) {
   if (!is_path(item.ptr())) {
     throw nb::type_error(

@@ -33,9 +33,7 @@ class AreaShare {
   }
 
   double share() const {
-    if (first_cell_mm_ == 0.0) {
-      throw Error(Fault::input, "no objects: give at least one");
-    }
+    require(first_cell_mm_ > 0.0, "objects", 0, "give at least one");
     // Where nothing, or everything, was in contact, half a cell keeps the logs finite.
     const double fraction = (occupied_ + 0.5) / (modelled_ + 1.0);
     return std::clamp(fraction, least_prior, 1.0 - least_prior);

@@ -256,7 +256,7 @@ TEST(EstimatePrior, StaysBetweenZeroAndOne) {
   none.pressure.front() = 1.0;
   EXPECT_GT(estimate({none}), 0.0);
   EXPECT_LT(estimate({none}), 0.01);
-  expect_named(input_error([] { estimate({}); }), {"no objects"});
+  expect_named(input_error([] { estimate({}); }), {"objects = 0: give at least one"});
   const OccupancyGrid drawn{.drawn = true, .nx = 1, .ny = 1, .log_odds = {1.0F}};
   expect_named(input_error([&] { with_prior(shared_device(), drawn, 2.0); }), {"'prior' = 2"});
 }
