@@ -5,8 +5,6 @@
 #include <limits>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "model/refuse.hpp"
 
 namespace palpate {
