@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "palpate/api.hpp"
 
@@ -19,10 +20,15 @@ enum class Fault {
 class PALPATE_API Error : public std::runtime_error {
  public:
   Error(Fault fault, std::string message)
-      : std::runtime_error((std::ranges::replace(message, '\n', ' '), message)), fault_(fault) {}
+      : std::runtime_error(one_line(std::move(message))), fault_(fault) {}
   Fault fault() const noexcept { return fault_; }
 
  private:
+  static std::string one_line(std::string text) {
+    std::ranges::replace(text, '\n', ' ');
+    return text;
+  }
+
   Fault fault_;
 };
 
