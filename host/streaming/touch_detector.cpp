@@ -150,12 +150,13 @@ struct TouchDetector::Impl {
     }
     const double time_s = frame.host_time_s;
     std::optional<DetectedTouch> ended;
-    const double elapsed_s = last_s ? time_s - *last_s : 0.0;
+    double elapsed_s = last_s ? time_s - *last_s : 0.0;
     if (elapsed_s > options.largest_gap_s || elapsed_s < 0.0) {
       ended = end_touch();
       rest.forget();
       smoother.reset();
       began_s.reset();
+      elapsed_s = 0.0;  // what the array read meanwhile is not known
     }
     last_s = time_s;
     began_s = began_s.value_or(time_s);
