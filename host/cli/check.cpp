@@ -31,14 +31,6 @@ struct CheckArguments {
   std::string write_array;
 };
 
-std::string json_of(const SetupCheck& check) {
-  auto all = nlohmann::ordered_json::array();
-  for (const SetupFinding& finding : check.findings) {
-    all.push_back(to_json(finding));
-  }
-  return all.dump(2) + "\n";
-}
-
 void check(const CheckArguments& options) {
   CommandFiles()
       .reads("RECORDING", options.recordings)
@@ -59,28 +51,25 @@ void check(const CheckArguments& options) {
   if (!options.write_array.empty()) {
     write_file(options.write_array, array_table(found.elements_mm));
   }
-  if (options.json == "-") {
-    fmt::print("{}", json_of(found));
-    return;
-  }
-  if (!options.json.empty()) {
-    write_file(options.json, json_of(found));
-  }
+  auto json = nlohmann::ordered_json::array();
+  std::string text;
   for (const SetupFinding& finding : found.findings) {
-    fmt::print("{} ({:.0f} nats)\n", in_flags(finding.words), finding.nats);
+    json.push_back(to_json(finding));
+    text += fmt::format("{} ({:.0f} nats)\n", in_flags(finding.words), finding.nats);
   }
   const auto moves_elements = [](const SetupFinding& finding) {
     return finding.what == "array_offset" || finding.what == "pitch";
   };
   if (options.write_array.empty() && std::ranges::any_of(found.findings, moves_elements)) {
-    fmt::print("palpate check --write-array FILE writes the corrected array\n");
+    text += "palpate check --write-array FILE writes the corrected array\n";
   }
   for (const std::string& remark : found.remarks) {
-    fmt::print("{}\n", in_flags(remark));
+    text += in_flags(remark) + "\n";
   }
   if (found.findings.empty()) {
-    fmt::print("{} touches: nothing is wrong with the set-up\n", found.touches);
+    text += fmt::format("{} touches: nothing is wrong with the set-up\n", found.touches);
   }
+  give_result(options.json, text_of(json, 2), text);
 }
 
 }  // namespace

@@ -347,22 +347,18 @@ void find_touches(const TouchesArguments& options) {
   write_recording(options.output, recording);
   fmt::print("{}: {} touches in {} frames of {}", options.output, recording.size(),
              stream->counters().frames, options.frames);
-  if (without_pose > 0) {
-    fmt::print(", {} without a pose left out", without_pose);
-  }
-  if (watch.missed() > 0) {
-    fmt::print(", {} left out as not steady", watch.missed());
+  std::uint64_t lost = stream->counters().lost;
+  count_lost(lost, unreadable);
+  for (const auto& [count, words] : {std::pair<std::uint64_t, const char*>{lost, "lost"},
+                                     {unknown, "readings unknown"},
+                                     {without_pose, "without a pose left out"},
+                                     {watch.missed(), "left out as not steady"}}) {
+    if (count > 0) {
+      fmt::print(", {} {}", count, words);
+    }
   }
   if (clock) {
     fmt::print(", clocks differ (palpate import --{})", fmt::join(clock->options, " --"));
-  }
-  std::uint64_t lost = stream->counters().lost;
-  count_lost(lost, unreadable);
-  if (lost > 0) {
-    fmt::print(", {} lost", lost);
-  }
-  if (unknown > 0) {
-    fmt::print(", {} readings unknown", unknown);
   }
   fmt::print("\n");
   for (const std::string& words : findings) {
