@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import pathlib
 import tempfile
 from collections.abc import Sequence
 from typing import Any
@@ -15,7 +14,7 @@ from palpate._tables import Column, Table, column, number, plain
 
 from .measures import bootstrap_record, level_in_modes, normalised_error, share_record, told_apart
 from .measures import with_interval
-from .program import Json, at_least_1, begin, main, parser, run_palpate, write
+from .program import Json, at_least_1, begin, main, parser, write
 from .scenarios import PLANNED, SCENARIOS, Scenario, slipping, trials_of
 from .trials import VOWELS, Bins, Body, Floats, lattice_of, letter_maps, training_recordings, truth_of
 
@@ -68,25 +67,20 @@ COLUMNS: dict[str, list[Column]] = {
 
 
 def learn(
-    device: palpate.Device, scenario: Scenario, recordings: Sequence[palpate.Recording], command: str,
-    folder: str,
-) -> tuple[Any, dict[str, palpate.OccupancyGrid]]:  # fmt: skip
+    device: palpate.Device, scenario: Scenario, recordings: Sequence[palpate.Recording], folder: str
+) -> tuple[Any, dict[str, palpate.OccupancyGrid]]:
     """What recognize() takes as maps, and the maps by label.
 
-    By `palpate map` where an engine takes the sensor that it learns, else by letter_maps(), with equal cells.
+    By learn_maps() where an engine takes the sensor that it learns, else by letter_maps(), with equal cells.
     """
     if not scenario.learns:
         maps = letter_maps(device, recordings)
         return maps, {grid.label: grid for grid in maps}
-    files = [f"{folder}/{recording.object}.h5" for recording in recordings]
-    for recording, file in zip(recordings, files, strict=True):
-        recording.save(file)
-    run_palpate(command, "map", *files, "-o", f"{folder}/maps/")
-    grids = [palpate.read_map(path) for path in pathlib.Path(folder, "maps").glob("*.map.h5")]
+    grids = palpate.learn_maps(recordings, folder, device=device).maps
     for grid in grids:
         if grid.suggested_symmetry is not None:  # errors are from the nearest of poses that look alike
             grid.symmetry = grid.suggested_symmetry
-    return f"{folder}/maps", {grid.label: grid for grid in grids}
+    return folder, {grid.label: grid for grid in grids}
 
 
 def planned(
@@ -251,7 +245,6 @@ def program() -> None:
         "--sets", type=at_least_1, default=1, metavar="N",
         help="training sets, each with unknowns of its own [%(default)s]",
     )  # fmt: skip
-    flags.add_argument("--palpate", default="build/palpate", help="the command [%(default)s]")
     options = flags.parse_args()
     device, facts = begin(options)
     chosen = {name: of for name, of in SCENARIOS.items() if name in (options.scenarios or SCENARIOS)}
@@ -272,7 +265,7 @@ def program() -> None:
                 )
                 if options.quick:
                     recordings = [recording[::5] for recording in recordings]
-                maps, grids = learn(device, scenario, recordings, options.palpate, folder)
+                maps, grids = learn(device, scenario, recordings, folder)
                 trials = trials_of(scenario, each, each_stranger, i * SET_SEEDS, folder)
                 for engine, own in scenario.engines.items():
                     for scored, some in zip(scores[engine], trials, strict=True):

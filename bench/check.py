@@ -3,7 +3,6 @@
 import math
 import pathlib
 import tempfile
-from collections.abc import Sequence
 from typing import Any
 
 import numpy
@@ -71,11 +70,6 @@ def misread(pressure: Floats, options: tuple[str, str]) -> Floats:
     return (grid.transpose(0, 2, 1) if columns else grid).reshape(pressure.shape)
 
 
-def changed(one: palpate.Recording, pressure: Any, poses: Any) -> palpate.Recording:
-    """The touches with other readings, or at other poses."""
-    return palpate.Recording(pressure, poses, one.elements_mm, object=one.object)
-
-
 class Set:
     """Touches of three objects, and what is done to them."""
 
@@ -84,6 +78,8 @@ class Set:
         left, self.seed, self.elements_mm = list(shapes), seed, elements_mm
         self.shapes = [left.pop(int(u * len(left))) for u in self.random.uniforms(OBJECTS)]
         self.touches = self.at([palpate.random_poses(TOUCHES, seed + k) for k in range(OBJECTS)])
+        self.pressures = [one.pressure for one in self.touches]
+        self.poses = [one.T_robot_sensor for one in self.touches]
 
     def at(self, poses: list[Floats]) -> Touches:
         return [
@@ -91,16 +87,15 @@ class Set:
             for k, (shape, pose) in enumerate(zip(self.shapes, poses, strict=True))
         ]
 
-    def posed(self, poses: Sequence[Floats]) -> Touches:
-        pairs = zip(self.touches, poses, strict=True)
-        return [changed(one, one.pressure, pose) for one, pose in pairs]
+    def changed(self, pressures: list[Floats], poses: list[Floats]) -> Touches:
+        """The touches with other readings, or at other poses."""
+        changes = zip(self.touches, pressures, poses, strict=True)
+        return [palpate.Recording(p, pose, one.elements_mm, object=one.object) for one, p, pose in changes]
 
     def misread(self) -> tuple[tuple[str, str], Touches]:
         """Touches whose elements are read in another order, and the options that say so."""
         options = list(ORDERS)[1 + int(self.random.uniforms(1)[0] * (len(ORDERS) - 1))]
-        return options, [
-            changed(one, misread(one.pressure, options), one.T_robot_sensor) for one in self.touches
-        ]
+        return options, self.changed([misread(pressure, options) for pressure in self.pressures], self.poses)
 
     def misplaced(self) -> tuple[Floats, Touches]:
         """Touches whose array sits elsewhere in the tool than their poses say, and where."""
@@ -114,35 +109,29 @@ class Set:
 
     def mounted(self, offset: Floats) -> tuple[Floats, Touches]:
         back = palpate.inverse(offset)
-        return offset, self.posed(
-            [
-                numpy.array([palpate.compose(pose, back) for pose in one.T_robot_sensor])
-                for one in self.touches
-            ]
-        )
+        poses = [numpy.array([palpate.compose(pose, back) for pose in of]) for of in self.poses]
+        return offset, self.changed(self.pressures, poses)
 
     def beyond(self) -> dict[str, Touches]:
         """Touches with faults that no set-up which is tried explains."""
-        poses = [one.T_robot_sensor for one in self.touches]
-        half = TOUCHES // 2
-        orders = [numpy.argsort(self.random.uniforms(TOUCHES)) for _ in poses]
-        gains = numpy.ones(len(self.elements_mm))
-        gains[: len(gains) // 2] = GAIN
+        half, pressures, poses = TOUCHES // 2, self.pressures, self.poses
+        shuffled = [pose[numpy.argsort(self.random.uniforms(TOUCHES))] for pose in poses]
+        gains = numpy.where(numpy.arange(len(self.elements_mm)) < len(self.elements_mm) // 2, GAIN, 1.0)
         mixed = [
             [numpy.concatenate([a[:half], b[half:]]) for a, b in zip(of, of[1:] + of[:1], strict=True)]
-            for of in ([one.pressure for one in self.touches], poses)
+            for of in (pressures, poses)
         ]
         return {
-            "late": self.posed([numpy.roll(pose, LATE, axis=0) for pose in poses]),
-            "shuffled": self.posed([pose[order] for pose, order in zip(poses, orders, strict=True)]),
-            "mirrored": self.posed([pose * (-1, 1, 1) for pose in poses]),
-            "two objects": [changed(*of) for of in zip(self.touches, *mixed, strict=True)],
-            "gain": [changed(one, one.pressure * gains, one.T_robot_sensor) for one in self.touches],
+            "late": self.changed(pressures, [numpy.roll(pose, LATE, axis=0) for pose in poses]),
+            "shuffled": self.changed(pressures, shuffled),
+            "mirrored": self.changed(pressures, [pose * (-1, 1, 1) for pose in poses]),
+            "two objects": self.changed(*mixed),
+            "gain": self.changed([pressure * gains for pressure in pressures], poses),
         }
 
     def at_one_angle(self) -> Touches:
         angle = 2 * math.pi * self.random.uniforms(1)[0]
-        return self.at([one.T_robot_sensor * (1, 1, 0) + (0, 0, angle) for one in self.touches])
+        return self.at([pose * (1, 1, 0) + (0, 0, angle) for pose in self.poses])
 
 
 def checked(device: palpate.Device, one: Set) -> Json:
@@ -190,15 +179,13 @@ def summary(elements: int, records: list[Json]) -> Json:
         "elements": elements,
         "sets": len(records),
         "sound": sum(not record["sound"] for record in records),
-        "order": sum(record["order"]["right"] for record in records),
+        **{name: sum(record[name]["right"] for record in records) for name in ("order", "offset", "mount")},
         "least_order_nats": min(record["order"]["nats"] for record in records),
-        "offset": sum(record["offset"]["right"] for record in records),
         "median_mm": float(numpy.median(mm)),
         "median_rad": float(numpy.median(rad)),
         "most_mm": float(numpy.quantile(mm, 0.9)),
         "most_rad": float(numpy.quantile(rad, 0.9)),
         "one_angle": sum(record["one_angle"] for record in records),
-        "mount": sum(record["mount"]["right"] for record in records),
         "beyond": sum(len(record["beyond"]) for record in records),
         "precise": sum(bool(words) for record in records for words in record["beyond"].values()),
     }

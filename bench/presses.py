@@ -1,9 +1,8 @@
 """Everyday objects pressed at unknown poses: which is it, after one press and after several?"""
 
-import json
-import pathlib
 import tempfile
 from collections.abc import Sequence
+from typing import Any
 
 import numpy
 
@@ -12,7 +11,7 @@ from palpate._tables import Column, Table, number, plain
 
 from .bounded import CLASSIFIER, pitch_of, read_presses
 from .measures import share_record, with_interval
-from .program import Json, begin, main, parser, run_palpate, write
+from .program import Json, begin, main, parser, write
 
 SEED = 800_000_000
 # Where an object may lie about the place where its map was learned, and how fine that is told apart: bins
@@ -62,7 +61,7 @@ def scores(records: Sequence[Json], presses: int, random: numpy.random.Generator
 
 
 def program() -> None:
-    """Odd presses are learned from, even ones are recognised, by the commands as a user gives them."""
+    """Odd presses are learned from, even ones are recognised, with the commands' defaults."""
     flags = parser(
         "presses",
         "Recognises objects pressed at unknown poses, from recordings of presses, one for each object: "
@@ -70,43 +69,32 @@ def program() -> None:
         "`palpate map` learns.",
     )
     flags.add_argument("--data", metavar="FOLDER", required=True, help="recordings of presses")
-    flags.add_argument("--palpate", default="build/palpate", help="the command [%(default)s]")
     options = flags.parse_args()
     recordings = read_presses(options.data)
     if options.quick:
         recordings = [one[:20] for one in recordings[:3]]
     device, facts = begin(options, f"{len(recordings)} objects, pressed at unknown poses")
+    for recording in recordings:
+        recording.truth = palpate.Truth(recording.object, (0.0, 0.0, 0.0))
+    learned, tried = ([recording[start::2] for recording in recordings] for start in (0, 1))
     document: Json = {}
     rows: list[Json] = []
-    with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(name)
-        learned: list[str] = []
-        tried: list[str] = []
-        for recording in recordings:
-            for start, files in ((0, learned), (1, tried)):
-                files.append(str(folder / f"{recording.object}.{start}.h5"))
-                half = recording[start::2]
-                half.truth = palpate.Truth(recording.object, (0.0, 0.0, 0.0))
-                half.save(files[-1])
-        result = folder / "records.json"
-        widest = (REACH + 0.5) * pitch_of(recordings[0].elements_mm)
-        region = [f"--{axis}-mm={-widest}:{widest}" for axis in "xy"]
-        bins = ["--filter", "histogram", "--bins", f"{TURNS}x{2 * REACH + 1}x{2 * REACH + 1}"]
-        raw = recordings[0].pressure_unit == "raw"
-        contact = ["--threshold", f"{CLASSIFIER.threshold}", "--ratio", f"{CLASSIFIER.ratio}"] if raw else []
-        for key, words, model in (
-            ("eq7", "Eq. 7", [*contact, "--sensor-model", "none"]),
-            ("learned", "learned", []),
-        ):
-            maps = str(folder / key) + "/"
-            run_palpate(options.palpate, "map", *learned, "--unposed", *model, "-o", maps)
-            recognize = ["recognize", *tried, "--each-frame", "--maps", maps, "--none", "0", *region, *bins]
-            run_palpate(options.palpate, *recognize, *model, "--device", device.name, "--json", str(result))
-            records = json.loads(result.read_text())
-            random = numpy.random.default_rng(SEED)
-            of_sensor = [scores(records, presses, random) for presses in TOGETHER]
-            document[key] = {"presses": {str(one["presses"]): one for one in of_sensor}}
-            rows += [{"sensor": words} | one for one in of_sensor]
+    widest = (REACH + 0.5) * pitch_of(recordings[0].elements_mm)
+    region: Any = {"x_mm": (-widest, widest), "y_mm": (-widest, widest)}
+    region |= {"filter": "histogram", "bins": (2 * REACH + 1, 2 * REACH + 1, TURNS)}
+    raw = recordings[0].pressure_unit == "raw"
+    contact = {"threshold": CLASSIFIER.threshold, "ratio": CLASSIFIER.ratio} if raw else {}
+    models: Any = (("eq7", "Eq. 7", {**contact, "sensor_model": "none"}), ("learned", "learned", {}))
+    for key, words, model in models:
+        with tempfile.TemporaryDirectory() as maps:
+            palpate.learn_maps(learned, maps, unposed=True, **model)
+            records = palpate.recognize(
+                tried, maps, each_frame=True, none=0.0, device=device, **region, **model
+            )
+        random = numpy.random.default_rng(SEED)
+        of_sensor = [scores(records, presses, random) for presses in TOGETHER]
+        document[key] = {"presses": {str(one["presses"]): one for one in of_sensor}}
+        rows += [{"sensor": words} | one for one in of_sensor]
     Table(COLUMNS, rows)
     write(options.json, facts | document)
 

@@ -2,14 +2,13 @@
 
 import argparse
 import platform
-import subprocess
 from collections.abc import Callable
 
 import palpate
 from palpate import _program
 from palpate._program import Json, write
 
-__all__ = ["Json", "at_least_1", "begin", "main", "parser", "run_palpate", "write"]
+__all__ = ["Json", "at_least_1", "begin", "main", "parser", "write"]
 
 
 def parser(name: str, description: str, *, plots: str = "", trials: str = "") -> argparse.ArgumentParser:
@@ -43,11 +42,3 @@ def begin(
 ) -> tuple[palpate.Device, Json]:
     """Opens the device and prints the facts. Raises palpate.Error as palpate._program.begin() does."""
     return _program.begin(options, python=platform.python_version(), data=data)
-
-
-def run_palpate(command: str, *arguments: str) -> str:
-    """What `palpate` prints."""
-    done = subprocess.run([command, *arguments], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise palpate.Error(done.stderr.strip())
-    return done.stdout

@@ -248,15 +248,15 @@ def pose_chart(document: Json) -> Axes:
     charts.ticks(axes.xaxis, seconds_text)
     fills: dict[float, Json] = {0.25: {"alpha": 0.4}, 0.5: {}, 1.0: charts.HOLLOW}
     best = []
-    for colour, (kind, of, name, mark, counted) in zip(
+    for colour, (kind, of, name, mark, side) in zip(
         charts.COLOURS,
         (
             # The refined pose stands right below its mode, and particles by their like.
-            ("histogram", "error_mm", "histogram, mode", "o", False),
-            ("histogram", "refined_error_mm", "histogram, refined", "s", True),
-            ("particles", "error_mm", "particles", "^", True),
-            ("augmented", "error_mm", "Augmented MCL", "D", False),
-            ("systematic", "error_mm", "systematic resampling", "^", False),
+            ("histogram", "error_mm", "histogram, mode", "o", ""),
+            ("histogram", "refined_error_mm", "histogram, refined", "s", "right"),
+            ("particles", "error_mm", "particles", "^", "left"),
+            ("augmented", "error_mm", "Augmented MCL", "D", ""),
+            ("systematic", "error_mm", "systematic resampling", "^", ""),
         ),
         strict=False,
     ):
@@ -273,9 +273,9 @@ def pose_chart(document: Json) -> Axes:
                 charts.series(axes, points, "seconds", f"{of}/mean", label, **look)
             for point in points:
                 place = point["seconds"], point[of]["mean"]
-                if counted and cell_mm == 0.5:
-                    text: Json = {"textcoords": "offset points", "fontsize": 8, "color": colour}
-                    axes.annotate(count_text(point["count"]), place, (6, 3), **text)
+                if side and cell_mm == 0.5:  # below the mark and left of it, or above and right
+                    text: Json = {"textcoords": "offset points", "fontsize": 8, "color": colour, "ha": side}
+                    axes.annotate(count_text(point["count"]), place, (6, 3) if side == "left" else (2, -13), **text)
                 if point["accuracy"] == 1.0 and point[of]["trials"] == document["trials"]:
                     best.append(place)
     if best:

@@ -35,10 +35,7 @@ html_math_renderer = "mathml"
 
 
 def math_visitor(inline):
-    """Equations become MathML, which browsers show without a script.
-
-    Sphinx's own renderers need a network or LaTeX.
-    """
+    """Equations become MathML, which browsers show without a script, a network or LaTeX."""
 
     def visit(self, node):
         self.body.append(latex2mathml.tex2mathml(node.astext(), inline=inline))
@@ -48,16 +45,19 @@ def math_visitor(inline):
 
 
 def namespace_content(self, node):
-    """Renders what a header adds to the namespace, and not the namespace itself.
-
-    Breathe would declare it anew for every header, of which Sphinx warns.
-    """
+    """Renders what a header adds to the namespace, which Breathe would declare anew for every header."""
     file = self.compound_parser.parse(node.refid)
     parent = self.context.create_child_context(file)
     with WithContext(self, parent.create_child_context(file.compounddef)):
         return self.render(file, parent)
 
 
+def lead_to_site(app, page, source):
+    """Links to a page of bench, as readers of the repository follow them, lead to its place on the site."""
+    source[0] = re.sub(r"\(\.\./bench/(\w+)\.md", lambda of: f"(benchmarks/{of[1].lower()}.md", source[0])
+
+
 def setup(app):
+    app.connect("source-read", lead_to_site)
     app.add_html_math_renderer("mathml", (math_visitor(True), None), (math_visitor(False), None))
     SphinxRenderer.visit_namespace = namespace_content

@@ -202,7 +202,7 @@ int run(int argc, char** argv) {
   if (const auto answer = answer_to_former_flag(arguments.subspan(argc > 0 ? 1 : 0))) {
     return complain(wrong_input, *answer);
   }
-  CLI::App app("Palpate recognises objects by touch and finds their poses, on Vulkan.", "palpate");
+  CLI::App app("Palpate recognises objects by touch and finds their poses.", "palpate");
   app.set_version_flag("--version", PALPATE_VERSION);
   app.require_subcommand(1);
   app.failure_message([](const CLI::App*, const CLI::Error&) { return std::string(); });

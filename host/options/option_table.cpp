@@ -106,9 +106,9 @@ const std::array table{
     Option{"tolerance", "", filter, &Request::tolerance, within_0_1,
            "With --filter bounded: largest share of the belief that may be left unproven; the "
            "search goes on until it is reached. Rounding, which counts as unproven, may exceed a "
-           "tolerance below about 1e-8 [default: 1e-6, and 1e-4 for what a trace or a picture of "
-           "'recognize' shows before the last touch; a search by a learned sensor ends sooner "
-           "where it meets nothing but poor fits]"},
+           "tolerance below about 1e-8 [default: 1e-6; before the last touch 1e-4 for a trace and "
+           "1e-3 for a picture of 'recognize'; a search by a learned sensor ends sooner where it "
+           "meets nothing but poor fits]"},
     Option{"budget-ms", "", filter, &Request::budget_ms, above_0,
            "With --filter bounded: milliseconds after which each estimate's search ends and "
            "reports what it has proven by then [default: none]"},

@@ -1,7 +1,6 @@
 """The programs over real arrays, on small data of the same layout from the simulated sensor."""
 
 import math
-import os
 import pathlib
 
 import numpy
@@ -203,8 +202,7 @@ def test_objects_pressed_anywhere_are_recognised(tmp_path: pathlib.Path) -> None
             letter, palpate.random_poses(20, seed), elements_mm=palpate.grid_array(12, 12, 2.5), seed=seed
         ).save(tmp_path / f"{letter}.h5")
     # Takes some seconds of a processor, to learn a sensor from presses at unknown poses.
-    command = ("--palpate", os.environ["PALPATE_COMMAND"])
-    document = Program(tmp_path, "bench.presses", "--quick", "--data", tmp_path, *command).document
+    document = Program(tmp_path, "bench.presses", "--quick", "--data", tmp_path).document
     for sensor in ("eq7", "learned"):
         of_sensor = document[sensor]["presses"]
         assert {one["unknowns"] for one in of_sensor.values()} == {30}

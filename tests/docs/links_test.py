@@ -23,13 +23,6 @@ def anchors_of(page: pathlib.Path) -> set[str]:
     return {re.sub(r"[^a-z0-9_-]", "", heading.replace(" ", "-").lower()) for heading in headings}
 
 
-def included_by(page: pathlib.Path) -> pathlib.Path:
-    """What a page of the site includes is at the page's place, too: bench/SWEEP.md in
-    docs/benchmarks/sweep.md."""
-    included = re.search(r"```\{include\} (.+)", page.read_text())
-    return page.parent / included[1] if included else page
-
-
 class Links(unittest.TestCase):
     def test_lead_to_files_and_headings(self) -> None:
         count = 0
@@ -42,7 +35,7 @@ class Links(unittest.TestCase):
                 file = page.parent / name if name else page
                 self.assertTrue(file.exists(), f"{page} links to {target}")
                 if hash:
-                    self.assertIn(anchor, anchors_of(included_by(file)), f"{page} links to {target}")
+                    self.assertIn(anchor, anchors_of(file), f"{page} links to {target}")
         self.assertGreater(count, 50, "the pattern finds the links")
 
 

@@ -22,7 +22,7 @@ def blocks_in(page: str) -> list[tuple[str, list[str]]]:
         if language == "sh":
             blocks.append((text, []))
         elif not language and blocks:
-            blocks[-1][1].extend(text.splitlines())
+            blocks[-1][1].extend(["...", *text.splitlines()])
     return blocks
 
 
@@ -45,6 +45,15 @@ def agree(quoted: str, printed: str) -> bool:
     return abs(float(a[1]) - float(b[1])) < 1.5 * 10.0 ** -len(a[2])
 
 
+def runs_of(lines: list[str]) -> list[list[str]]:
+    """Lines with the indented ones below them, such as what else a table says of an unknown."""
+    runs: list[list[str]] = [[""]]
+    for line in lines:
+        runs += [] if line.startswith(" ") else [[]]
+        runs[-1].append(line)
+    return runs
+
+
 def holds(printed: list[str], quoted: list[str]) -> bool:
     """Whether a line has these words, in their order: a quotation may leave columns of a table out."""
     words = iter(printed)
@@ -56,7 +65,8 @@ class Pages(CommandTest):
 
     def run_page(self, page: str) -> tuple[str, str]:
         """Runs all blocks ```sh of a page, in their order, as one script that any failure ends, and
-        returns what they print and what they complain of. A line that is quoted and not printed fails."""
+        returns what they print and what they complain of. A line that is quoted and not printed fails, as
+        does an indented one that is not printed below the line that it is quoted below."""
         blocks = blocks_in((ROOT / "docs" / page).read_text())
         self.assertTrue(blocks, f"{page} has no commands")
         end = "printf '\\x1e'; printf '\\x1e' >&2\n"
@@ -72,10 +82,13 @@ class Pages(CommandTest):
         self.assertEqual(run.returncode, 0, run.stderr)
         printed = zip(run.stdout.split(END_OF_BLOCK), run.stderr.split(END_OF_BLOCK), strict=True)
         for (_, quoted), texts in zip(blocks, printed, strict=False):
-            lines = [words_of(line) for line in "".join(texts).splitlines()]
-            for line in quoted:
-                if line != "..." and not any(holds(other, words_of(line)) for other in lines):
-                    self.fail(f"the commands above it do not print: {line}\nbut:\n{''.join(texts)}")
+            runs = [[words_of(line) for line in run] for run in runs_of("".join(texts).splitlines())]
+            for head, *below in runs_of(quoted)[1:]:
+                left_out = head == "..."
+                beside = [run for run in runs if left_out or holds(run[0], words_of(head))]
+                for line in below if left_out or below else [head]:
+                    if not any(holds(other, words_of(line)) for run in beside for other in run):
+                        self.fail(f"the commands above it do not print: {line}\nbut:\n{''.join(texts)}")
         return run.stdout.replace(END_OF_BLOCK, ""), run.stderr.replace(END_OF_BLOCK, "")
 
     def json(self, file: str) -> Any:
