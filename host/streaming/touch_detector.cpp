@@ -152,11 +152,12 @@ struct TouchDetector::Impl {
     std::optional<DetectedTouch> ended;
     double elapsed_s = last_s ? time_s - *last_s : 0.0;
     if (elapsed_s > options.largest_gap_s || elapsed_s < 0.0) {
+      // A press may have gone on; of what was untouched, the next frames tell the drift.
+      elapsed_s = touching ? 0.0 : std::min(elapsed_s, options.drift_s - options.smooth_s);
       ended = end_touch();
       rest.forget();
       smoother.reset();
       began_s.reset();
-      elapsed_s = 0.0;  // what the array read meanwhile is not known
     }
     last_s = time_s;
     began_s = began_s.value_or(time_s);

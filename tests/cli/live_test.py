@@ -212,7 +212,6 @@ class Live(PreparedTest, StreamTest):
         self.assertEqual(wrong.count("\n"), 1, wrong)
 
     def test_ends_where_a_line_cannot_be_written(self) -> None:
-        endless = live("simulate:A,speed=max")
+        endless, full = live("simulate:A,speed=max"), lambda: os.dup2(os.open("/dev/full", os.O_WRONLY), 1)
         self.assertIn("/dev/full", self.palpate(*endless, "--json", "/dev/full", status=1).stderr)
-        full = self.palpate(*endless, status=1, preexec_fn=lambda: os.dup2(os.open("/dev/full", os.O_WRONLY), 1))
-        self.assertIn("standard output", full.stderr)
+        self.assertIn("standard output", self.palpate(*endless, status=1, preexec_fn=full).stderr)

@@ -216,10 +216,6 @@ TEST_F(MapUnposedCommand, RefusesInOneLine) {
   expect_refused("map A.h5 -o new/ --max-maps 2", {"--max-maps 2", "--unposed"});
   expect_refused("map A.h5 -o new/ --unposed --threshold 1000", {"'A'", "no press", "threshold"});
   expect_refused("map A.h5 -o new/ --unposed --sensor-model none.yaml", {"none.yaml"});
-  Recording raw = unposed_presses("A", 6, 1);
-  raw.pressure_unit = "raw";
-  write_recording(folder_ / "raw.h5", raw);
-  expect_refused("map raw.h5 -o new/ --unposed", {"raw.h5: no sensor model: it", "--threshold"});
 }
 
 class MapWithSensorModel : public ProgramTest {
