@@ -41,17 +41,22 @@ float wrap(const float theta_rad) {
   return theta_rad - 2.0 * PI * floor(theta_rad * (0.5 / PI) + 0.5);
 }
 
+// Moves `low` on to the first of low to high for which, as `middle`, `is_below` holds, or to high.
+#define SEARCH(low, high, is_below)      \
+  while (low < high) {                   \
+    const uint middle = (low + high) / 2; \
+    const bool below = is_below;         \
+    low = below ? low : middle + 1;      \
+    high = below ? middle : high;        \
+  }
+
 Particle initial(const uint particle) {
   const uvec4 words = random(particle, RANDOM_POSE);
   uint low = 0;
   uint high = push.objects - 1;
-  while (low < high) {
-    const uint middle = (low + high) / 2;
-    const bool below = push.draw == DRAW_INITIAL ? particle < shares[middle].particle_end
-                                                 : words.w < shares[middle].chance_end;
-    low = below ? low : middle + 1;
-    high = below ? middle : high;
-  }
+  SEARCH(low, high,
+         push.draw == DRAW_INITIAL ? particle < shares[middle].particle_end
+                                   : words.w < shares[middle].chance_end)
   return Particle(low, push.half_x_mm * uniform_of(words.x), push.half_y_mm * uniform_of(words.y),
                   wrap(push.half_theta_rad * uniform_of(words.z)));
 }
@@ -60,12 +65,7 @@ Particle initial(const uint particle) {
 uint find(const uint key, const uint chance) {
   uint low = 0;
   uint high = push.blocks - 1;
-  while (low < high) {
-    const uint middle = (low + high) / 2;
-    const bool below = key < uint(texelFetch(blocks, int(middle)).x);
-    low = below ? low : middle + 1;
-    high = below ? middle : high;
-  }
+  SEARCH(low, high, key < uint(texelFetch(blocks, int(middle)).x))
   const ivec4 block = texelFetch(blocks, int(low));
   const float sum = intBitsToFloat(block.w);
   const float place = push.draw == DRAW_MULTINOMIAL
@@ -77,12 +77,7 @@ uint find(const uint key, const uint chance) {
 
   low *= WEIGHT_BLOCK;
   high = min(low + WEIGHT_BLOCK, push.particles) - 1;
-  while (low < high) {
-    const uint middle = (low + high) / 2;
-    const bool below = target < cumulative[middle];
-    low = below ? low : middle + 1;
-    high = below ? middle : high;
-  }
+  SEARCH(low, high, target < cumulative[middle])
   return low;
 }
 

@@ -197,13 +197,11 @@ void add_calibrate(CLI::App& app) {
       "elements read on and beside an object, and how sure to be. map, recognize, live, batch and "
       "plan take it as --sensor-model",
       calibrate);
-  command
-      ->add_option(
-          "RECORDING", options->recordings,
-          "Recordings (HDF5) that name their object, best with 15 touches or more of each object. "
-          "Where all touches of a recording are at one pose, their poses count as unknown")
-      ->required();
-  command->add_option("-o,--output", options->output, "Sensor model to write (YAML)")->required();
+  add_required(
+      *command, "RECORDING", options->recordings,
+      "Recordings (HDF5) that name their object, best with 15 touches or more of each object. "
+      "Where all touches of a recording are at one pose, their poses count as unknown");
+  add_required(*command, "-o,--output", options->output, "Sensor model to write (YAML)");
   command->add_option(
       "--maps", options->maps,
       "Maps, or folders of maps, of the objects, from drawings, which also tell where the array "
@@ -221,24 +219,20 @@ void add_calibrate(CLI::App& app) {
                   "Contact threshold, in the recordings' pressure unit [default: learned]");
   add_option_flag(*command, options->recognition, "ratio",
                   "Threshold as a fraction of the touch's largest pressure [default: learned]");
-  command
-      ->add_option(
-          "--layer", options->request.layer,
-          "What of a map readings are compared with: mean_level, the mean pressure; log_odds, of "
-          "occupancy; or auto: mean_level at known poses; at unknown poses both are tried, and "
-          "log_odds is kept unless mean_level is clearly better about presses that it has not seen")
-      ->capture_default_str();
+  add_with_default(
+      *command, "--layer", options->request.layer,
+      "What of a map readings are compared with: mean_level, the mean pressure; log_odds, of "
+      "occupancy; or auto: mean_level at known poses; at unknown poses both are tried, and "
+      "log_odds is kept unless mean_level is clearly better about presses that it has not seen");
   command
       ->add_option("--levels", options->request.levels,
                    "Levels of readings that are told apart, No Contact included [default: 7 over "
                    "the mean pressure, 2 over log odds]")
       ->check(require_whole_number);
-  command
-      ->add_option("--max-maps", options->request.max_maps,
+  add_with_default(*command, "--max-maps", options->request.max_maps,
                    "Most maps of an object that a touch is compared with to learn how sure to be: "
                    "about as many as you will recognise with. More maps take longer")
-      ->check(require_whole_number)
-      ->capture_default_str();
+      ->check(require_whole_number);
   add_option_flag(*command, options->recognition, "bins",
                   "Pose bins that recognize will be given, as 25x25x16; for touches at known "
                   "poses. Unknowns lie between bins, and fit the worse the wider bins are: "

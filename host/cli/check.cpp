@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -53,14 +52,13 @@ void check(const CheckArguments& options) {
   }
   auto json = nlohmann::ordered_json::array();
   std::string text;
+  bool moves_elements = false;
   for (const SetupFinding& finding : found.findings) {
     json.push_back(to_json(finding));
     text += fmt::format("{} ({:.0f} nats)\n", in_flags(finding.words), finding.nats);
+    moves_elements = moves_elements || finding.what == "array_offset" || finding.what == "pitch";
   }
-  const auto moves_elements = [](const SetupFinding& finding) {
-    return finding.what == "array_offset" || finding.what == "pitch";
-  };
-  if (options.write_array.empty() && std::ranges::any_of(found.findings, moves_elements)) {
+  if (options.write_array.empty() && moves_elements) {
     text += "palpate check --write-array FILE writes the corrected array\n";
   }
   for (const std::string& remark : found.remarks) {
@@ -82,11 +80,9 @@ void add_check(CLI::App& app) {
       "that contradict the others. Each finding comes with its evidence, in nats, and what mends "
       "it",
       check);
-  command
-      ->add_option("RECORDING", options->recordings,
-                   "Recordings of touches (HDF5), of one array and of objects that stay in place: "
-                   "some 60 of each, at several angles of the sensor, so that they overlap")
-      ->required();
+  add_required(*command, "RECORDING", options->recordings,
+               "Recordings of touches (HDF5), of one array and of objects that stay in place: "
+               "some 60 of each, at several angles of the sensor, so that they overlap");
   command->add_option("--json", options->json, "File for the findings as JSON, or -");
   command->add_option("--write-array", options->write_array,
                       "File for the array as the findings correct it (CSV: x, y in mm), for "
@@ -96,8 +92,7 @@ void add_check(CLI::App& app) {
                   "for raw pressure]");
   add_option_flag(*command, options->request, "ratio",
                   "Threshold as a fraction of the touch's largest pressure [default: 0.3]");
-  command->add_option("--cell-mm", options->cell_mm, "Edge of a map's cell, mm")
-      ->capture_default_str();
+  add_with_default(*command, "--cell-mm", options->cell_mm, "Edge of a map's cell, mm");
   command->add_option("--spread-mm", options->spread_mm,
                       "Standard deviation of the inverse sensor model, mm [default: a quarter of "
                       "the distance of neighbouring elements; 0.5 for DigiTacts and one element]");

@@ -13,6 +13,7 @@
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/sensor_option.hpp"
+#include "cli/text_table.hpp"
 #include "io/recording_rules.hpp"
 #include "io/recording_survey.hpp"
 #include "io/table_columns.hpp"
@@ -71,9 +72,7 @@ void print_summary(const ImportArguments& options, const ImportedRecording& impo
     const bool alive = r.valid.empty() || r.valid[k % r.valid.size()] != 0;
     unknown += !alive || std::isnan(r.pressure[k]) ? 1 : 0;
   }
-  if (unknown > 0) {
-    fmt::print(", {} readings unknown or dead", unknown);
-  }
+  fmt::print("{}", also(unknown, "readings unknown or dead"));
   if (imported.holds_poses && options.poses.empty()) {
     fmt::print(", its columns of poses left out (--poses {})", options.pressures);
   }

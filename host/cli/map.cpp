@@ -26,15 +26,11 @@ namespace palpate::cli {
 namespace {
 
 void add_map_flags(CLI::App& command, MapFlags& flags) {
-  command
-      .add_option("RECORDING", flags.recordings,
-                  "Recordings of touches (HDF5), or drawings (PNG), each of one object")
-      ->required();
-  command
-      .add_option(
-          "-o,--output", flags.output,
-          "Map to write (HDF5), or FOLDER/ for one map of each object, or several with --unposed")
-      ->required();
+  add_required(command, "RECORDING", flags.recordings,
+               "Recordings of touches (HDF5), or drawings (PNG), each of one object");
+  add_required(
+      command, "-o,--output", flags.output,
+      "Map to write (HDF5), or FOLDER/ for one map of each object, or several with --unposed");
   command
       .add_option("--cell-mm", flags.cell_mm,
                   "Edge of a cell, mm; with --unposed by default half the distance of neighbouring "

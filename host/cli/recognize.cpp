@@ -93,22 +93,6 @@ void export_posterior(const std::filesystem::path& path, const RecognitionTask& 
   });
 }
 
-/// Writes posterior and JSON. The JSON appears only after the posterior.
-void write_results(const RecognizeArguments& options, const RecognitionTask& task,
-                   const Recogniser& recogniser, const std::string& json) {
-  std::optional<AtomicFile> json_file;
-  if (!options.json.empty() && options.json != "-") {
-    json_file.emplace(options.json);
-    json_file->write(json);
-  }
-  if (!options.posterior.empty()) {
-    export_posterior(options.posterior, task, recogniser);
-  }
-  if (json_file) {
-    json_file->commit();
-  }
-}
-
 void recognize(const RecognizeArguments& options) {
   const RecognitionJob job{complete(options.request),
                            read_touch_recordings(options.recordings),
@@ -166,20 +150,26 @@ void recognize(const RecognizeArguments& options) {
   if (!unresolved.empty()) {
     tell_on_stderr(unresolved);
   }
-
+  // Files come first, both or none: printing fails where the reader of standard output has ended.
   const std::string json_text = text_of(json, 2);
-  // Files come first: printing fails where the reader of standard output has ended.
-  write_results(options, task, recogniser, json_text);
-  if (options.json == "-") {
-    fmt::print("{}", json_text);
-  } else {
-    if (request.trace) {
-      for (const RecognitionRecord& record : records) {
-        fmt::print("{}\n", trace_table(record, task));
-      }
-    }
-    fmt::print("{}{}\n", result_table(records, task), setup_words(job));
+  std::optional<AtomicFile> json_file;
+  if (!options.json.empty() && options.json != "-") {
+    json_file.emplace(options.json);
+    json_file->write(json_text);
   }
+  if (!options.posterior.empty()) {
+    export_posterior(options.posterior, task, recogniser);
+  }
+  if (json_file) {
+    json_file->commit();
+  }
+  std::string text;
+  for (const RecognitionRecord& record : records) {
+    text += request.trace ? trace_table(record, task) + "\n" : "";
+  }
+  fmt::print("{}", options.json == "-"
+                       ? json_text
+                       : text + result_table(records, task) + setup_words(job) + "\n");
   if (options.verbose) {
     double seconds = 0.0;
     for (const RecognitionRecord& record : records) {

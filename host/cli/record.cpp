@@ -12,6 +12,7 @@
 #include "cli/interruption.hpp"
 #include "cli/options.hpp"
 #include "cli/sensor_option.hpp"
+#include "cli/text_table.hpp"
 #include "model/printable.hpp"
 #include "model/stream_time.hpp"
 #include "palpate/error.hpp"
@@ -109,9 +110,7 @@ std::string record_frames(Sensor& sensor, SensorDescription description,
                          ? fmt::format(", {:.1f} Hz", static_cast<double>(frames - 1) / elapsed_s)
                          : "",
                      recorder->lost(), recorder->with_pose(),
-                     recorder->unknown_readings() > 0
-                         ? fmt::format(", {} readings unknown", recorder->unknown_readings())
-                         : "");
+                     also(recorder->unknown_readings(), "readings unknown"));
 }
 
 void record(const RecordArguments& options) {

@@ -317,13 +317,8 @@ std::string summary(const LiveState& state, std::vector<double> latencies_ms,
   if (state.counters.reconnects > 0) {
     text += fmt::format(", the board came back {} times", state.counters.reconnects);
   }
-  if (state.without_pose > 0) {
-    text += fmt::format(", {} touches without a pose passed over", state.without_pose);
-  }
-  if (state.unknown_readings > 0) {
-    text += fmt::format(", {} readings unknown", state.unknown_readings);
-  }
-  text += "\n";
+  text += also(state.without_pose, "touches without a pose passed over") +
+          also(state.unknown_readings, "readings unknown") + "\n";
   if (!latencies_ms.empty()) {
     std::ranges::sort(latencies_ms);
     const std::size_t n = latencies_ms.size();

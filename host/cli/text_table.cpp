@@ -59,6 +59,10 @@ std::string count_of(std::size_t count, const char* one, const char* more) {
   return fmt::format("{} {}", count, count == 1 ? one : more);
 }
 
+std::string also(std::uint64_t count, const char* words) {
+  return count > 0 ? fmt::format(", {} {}", count, words) : "";
+}
+
 TextTable::TextTable(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
 void TextTable::add(const Row& cells) { rows_.push_back(printable_cells(cells)); }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,6 +23,8 @@ std::string percent(double share);
 std::string range_words(const Interval& interval);
 /// A count with its noun: "1 record", "2 records".
 std::string count_of(std::size_t count, const char* one, const char* more);
+/// ", 12 lost" of what there is some; "" of what there is none.
+std::string also(std::uint64_t count, const char* words);
 
 /// A table for people. Every column is as wide as its longest cell; a column without any content is
 /// left out. Bytes that cannot be shown become '?'.

@@ -17,6 +17,7 @@
 #include "cli/commands.hpp"
 #include "cli/options.hpp"
 #include "cli/sensor_option.hpp"
+#include "cli/text_table.hpp"
 #include "io/recording_state.hpp"
 #include "model/option_words.hpp"
 #include "model/stream_time.hpp"
@@ -345,22 +346,15 @@ void find_touches(const TouchesArguments& options) {
   }
   shorten_valid(recording, sensor.valid);
   write_recording(options.output, recording);
-  fmt::print("{}: {} touches in {} frames of {}", options.output, recording.size(),
-             stream->counters().frames, options.frames);
   std::uint64_t lost = stream->counters().lost;
   count_lost(lost, unreadable);
-  for (const auto& [count, words] : {std::pair<std::uint64_t, const char*>{lost, "lost"},
-                                     {unknown, "readings unknown"},
-                                     {without_pose, "without a pose left out"},
-                                     {watch.missed(), "left out as not steady"}}) {
-    if (count > 0) {
-      fmt::print(", {} {}", count, words);
-    }
-  }
-  if (clock) {
-    fmt::print(", clocks differ (palpate import --{})", fmt::join(clock->options, " --"));
-  }
-  fmt::print("\n");
+  fmt::print(
+      "{}: {} touches in {} frames of {}{}{}{}{}{}\n", options.output, recording.size(),
+      stream->counters().frames, options.frames, also(without_pose, "without a pose left out"),
+      also(watch.missed(), "left out as not steady"),
+      clock ? fmt::format(", clocks differ (palpate import --{})", fmt::join(clock->options, " --"))
+            : "",
+      also(lost, "lost"), also(unknown, "readings unknown"));
   for (const std::string& words : findings) {
     tell_on_stderr(fmt::format("{}: {}", options.frames, words));
   }

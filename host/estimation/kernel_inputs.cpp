@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "estimation/kernel_sizes.hpp"
+#include "model/touch_evidence.hpp"
 #include "palpate/error.hpp"
 
 namespace palpate {
@@ -149,14 +150,12 @@ std::vector<shaders::Split> axes_in_cells(const OccupancyGrid& map, const PoseLa
 std::vector<std::uint32_t> contact_constants(const gpu::Limits& limits, const ContactModel& model) {
   const std::uint32_t lanes = independent_lanes(limits);
   if (const auto& table = model.table) {
-    const double nodes_per_nat =
-        static_cast<double>(table->nodes - 1) / (table->last_log_odds - table->first_log_odds);
     return {lanes,
             shaders::AS_TABLE,
             0,
             0,
             bits(table->first_log_odds),
-            bits(nodes_per_nat),
+            bits(nodes_per_nat(*table)),
             static_cast<std::uint32_t>(table->nodes)};
   }
   const double floor = model.gamma * model.prior.value();

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <tuple>
 #include <utility>
 
+#include "estimation/log_sum.hpp"
 #include "palpate/occupancy_grid.hpp"
 
 namespace palpate {
@@ -68,15 +68,11 @@ bool touched_before(const KnownElements& a, const KnownElements& b) {
 double prior_log_likelihood(Reading reading, const ContactModel& contact) {
   const MapSample prior{.log_odds = log_odds_from_probability(contact.prior.value())};
   const std::size_t sets = contact.table ? contact.table->sets() : 1;
-  double largest = -std::numeric_limits<double>::infinity();
+  LogSum sum;
   for (std::size_t set = 0; set < sets; ++set) {
-    largest = std::max(largest, contact.log_likelihood(reading, prior, set));
+    sum.add(contact.log_likelihood(reading, prior, set));
   }
-  double sum = 0.0;
-  for (std::size_t set = 0; set < sets; ++set) {
-    sum += std::exp(contact.log_likelihood(reading, prior, set) - largest);
-  }
-  return largest + std::log(sum / static_cast<double>(sets));
+  return sum.log() - std::log(static_cast<double>(sets));
 }
 
 }  // namespace
@@ -152,12 +148,10 @@ KnownElements gathered(std::span<const TouchEvidence> touches, const glm::dvec2&
   return known;
 }
 
-double prior_log_likelihood(std::span<const KnownElements> elements, const ContactModel& contact) {
+double prior_log_likelihood(const KnownElements& elements, const ContactModel& contact) {
   std::array<std::size_t, most_reading_levels> counts{};
-  for (const KnownElements& known : elements) {
-    for (const ReadingRun& run : known.runs) {
-      counts[static_cast<std::size_t>(run.reading)] += run.end - run.begin;
-    }
+  for (const ReadingRun& run : elements.runs) {
+    counts[static_cast<std::size_t>(run.reading)] += run.end - run.begin;
   }
   double sum = 0.0;
   for (std::size_t level = 0; level < counts.size(); ++level) {

@@ -78,7 +78,7 @@ inline constexpr double contradiction_nats = 700.0;
 /// The log-likelihood of the elements on a map of nothing but the prior (Eq. 7), in nats. Where a
 /// table holds numbers of their own for every object, that of a reading is the log of the mean of
 /// the objects' likelihoods.
-double prior_log_likelihood(std::span<const KnownElements> elements, const ContactModel& contact);
+double prior_log_likelihood(const KnownElements& elements, const ContactModel& contact);
 /// The log-likelihood of the elements on such a map by the numbers of each of so many objects, in
 /// nats, [object].
 std::vector<double> prior_log_likelihoods(const KnownElements& elements,

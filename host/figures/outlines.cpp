@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "model/bounding_box.hpp"
 #include "palpate/pose.hpp"
 
 namespace palpate {
@@ -56,32 +57,18 @@ std::vector<glm::dvec2> without_straight_corners(std::span<const glm::dvec2> hul
   return corners;
 }
 
-/// Returns the direction of the hull's edge along which the smallest enclosing rectangle lies, by
-/// rotating calipers (Toussaint 1983): as the edge goes round, so do the corners farthest along it,
-/// across it and back along it.
+/// Returns the direction of the hull's edge along which the smallest enclosing rectangle lies.
 double orientation_rad(std::span<const glm::dvec2> hull) {
-  const std::size_t n = hull.size();
-  const auto corner = [&](std::size_t k) { return hull[k % n]; };
   double best_area = std::numeric_limits<double>::infinity();
   double best_rad = 0.0;
-  std::size_t right = 0;
-  std::size_t top = 0;
-  std::size_t left = 0;
-  for (std::size_t k = 0; k < n; ++k) {
-    const glm::dvec2 edge = corner(k + 1) - corner(k);
+  for (std::size_t k = 0; k < hull.size(); ++k) {
+    const glm::dvec2 edge = hull[(k + 1) % hull.size()] - hull[k];
     const glm::dvec2 along = edge / glm::length(edge);
-    // Returns the farthest corner in a direction, starting from the last edge's farthest corner.
-    const auto advance = [&](std::size_t from, glm::dvec2 direction) {
-      while (from < k + n && glm::dot(direction, corner(from + 1) - corner(from)) > 0.0) {
-        ++from;
-      }
-      return from;
-    };
-    right = advance(std::max(right, k + 1), along);
-    top = advance(std::max(top, right), {-along.y, along.x});
-    left = advance(std::max(left, top), -along);
-    const double area =
-        glm::dot(along, corner(right) - corner(left)) * cross(along, corner(top) - corner(k));
+    BoundingBox box;
+    for (const glm::dvec2& corner : hull) {
+      box.take_in({glm::dot(along, corner - hull[k]), cross(along, corner - hull[k])});
+    }
+    const double area = box.extent().x * box.extent().y;
     if (area < best_area) {
       best_area = area;
       best_rad = std::atan2(edge.y, edge.x);

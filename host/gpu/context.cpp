@@ -205,24 +205,6 @@ void Context::inspect() {
   limits_.memory = device_memory(memory_);
 }
 
-void Context::lower_limits(const Limits& limits) {
-  inspect();
-  const Limits own = limits_;
-  limits_ = limits;
-  const auto at_most = [](auto& limit, auto bound) { limit = std::min(limit, bound); };
-  at_most(limits_.group_invocations, own.group_invocations);
-  for (std::size_t i = 0; i < 3; ++i) {
-    at_most(limits_.group_size[i], own.group_size[i]);
-    at_most(limits_.group_count[i], own.group_count[i]);
-  }
-  at_most(limits_.shared_bytes, own.shared_bytes);
-  at_most(limits_.storage_range, own.storage_range);
-  at_most(limits_.allocation, own.allocation);
-  at_most(limits_.table_texels, own.table_texels);
-  at_most(limits_.memory, own.memory);
-  at_most(limits_.push_bytes, own.push_bytes);
-}
-
 Context::~Context() {
   // Every command stream has waited for its own commands; the program's are not ours to wait for.
   pipelines_.clear();

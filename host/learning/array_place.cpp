@@ -23,6 +23,7 @@
 #include <glm/matrix.hpp>
 
 #include "learning/local_search.hpp"
+#include "model/angle_unit.hpp"
 #include "model/map_likelihood.hpp"
 #include "model/touch_evidence.hpp"
 
@@ -36,9 +37,7 @@ namespace {
 /// @param nats log-likelihood of the touches with the array at a pose in its own frame
 std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& nats,
                                       const Pose& start = {}) {
-  using Place = std::array<double, 3>;
-  const auto pose_of = [](const Place& at) { return Pose{{at[0], at[1]}, at[2]}; };
-  std::map<Place, double> known;
+  std::map<std::array<double, 3>, double> known;
   const auto judged = [&](const Pose& at) {
     const auto [entry, is_new] =
         known.try_emplace({at.translation_mm.x, at.translation_mm.y, at.theta_rad});
@@ -47,35 +46,31 @@ std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& 
     }
     return entry->second;
   };
+  const auto pose_of = [](const glm::dvec3& at) { return Pose{glm::dvec2(at), at.z}; };
   const auto& [found, top] = climb_poses({start, judged(start)}, {{1.0, 1.0}, 0.1}, 4, judged);
-  const Place best{found.translation_mm.x, found.translation_mm.y, found.theta_rad};
+  const glm::dvec3 best(found.translation_mm, found.theta_rad);
   // The likelihood near its maximum as a parabola, in units of twice the finest steps.
-  constexpr Place unit{0.25, 0.25, 0.025};
-  const auto near = [&](std::size_t a, double da, std::size_t b, double db) {
-    Place at = best;
-    at[a] += da * unit[a];
-    at[b] += db * unit[b];
-    return judged(pose_of(at));
-  };
+  constexpr glm::dvec3 unit{0.25, 0.25, 0.025};
+  const auto near = [&](const glm::dvec3& steps) { return judged(pose_of(best + unit * steps)); };
+  const glm::dmat3 axis(1.0);
   glm::dvec3 slope;
   glm::dmat3 information;
   for (int a = 0; a < 3; ++a) {
-    slope[a] = (near(a, 1, a, 0) - near(a, -1, a, 0)) / 2.0;
-    information[a][a] = std::max(2.0 * top - near(a, 1, a, 0) - near(a, -1, a, 0), 1e-3);
+    slope[a] = (near(axis[a]) - near(-axis[a])) / 2.0;
+    information[a][a] = std::max(2.0 * top - near(axis[a]) - near(-axis[a]), 1e-3);
     for (int b = 0; b < a; ++b) {
-      const double mixed =
-          -(near(a, 1, b, 1) - near(a, 1, b, -1) - near(a, -1, b, 1) + near(a, -1, b, -1)) / 4.0;
+      const double mixed = -(near(axis[a] + axis[b]) - near(axis[a] - axis[b]) -
+                             near(axis[b] - axis[a]) + near(-axis[a] - axis[b])) /
+                           4.0;
       const double limit = 0.9 * std::sqrt(information[a][a] * information[b][b]);
       information[a][b] = information[b][a] = std::clamp(mixed, -limit, limit);
     }
   }
   const glm::dmat3 covariance = glm::inverse(information);
-  const glm::dvec3 peak = glm::clamp(covariance * slope, -1.0, 1.0);
-  Place offset = best;
+  const glm::dvec3 offset = best + unit * glm::clamp(covariance * slope, -1.0, 1.0);
   std::array<double, 3> sd{};
   double excess = 0.0;  // of the largest part in standard deviations
   for (int a = 0; a < 3; ++a) {
-    offset[a] += unit[a] * peak[a];
     sd[a] = unit[a] * std::sqrt(std::max(covariance[a][a], 1e-4));
     excess = std::max(excess, std::abs(offset[a]) / std::max(sd[a], unit[a] / 4.0));
   }
@@ -84,14 +79,13 @@ std::optional<SetupFinding> offset_of(const std::function<double(const Pose&)>& 
   if (!(gain > least_nats && excess > least_excess)) {
     return {};
   }
-  constexpr double degrees = 180.0 / std::numbers::pi;
   return SetupFinding{
       "array_offset",
       gain,
       fmt::format("the array sits in the tool at x {:+.2f} +- {:.2f} mm, y {:+.2f} +- {:.2f} mm, "
                   "turned by {:+.1f} +- {:.1f} degrees, from where its elements are said to be: "
                   "import with the corrected array",
-                  offset[0], sd[0], offset[1], sd[1], degrees * offset[2], degrees * sd[2]),
+                  offset[0], sd[0], offset[1], sd[1], degrees(offset[2]), degrees(sd[2])),
       {},
       pose_of(offset),
       sd};

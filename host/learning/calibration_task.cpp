@@ -121,10 +121,9 @@ CalibrationTask calibration_task(const CalibrationRequest& request, const Reques
   if (!request.group.empty() && std::ranges::all_of(task.presses, [&](const Press& press) {
         return press.group == task.presses.front().group;
       })) {
-    throw Error(Fault::input,
-                fmt::format("`group {}`: all touches are of '{}'; give touches of two groups or "
-                            "more, or leave it out",
-                            request.group, task.presses.front().group));
+    refuse_option("group", request.group,
+                  "all touches are of '{}'; give touches of two groups or more, or leave it out",
+                  task.presses.front().group);
   }
   check_numbers(request, recognition);
   const bool gives_bins = recognition.bins || recognition.x_mm || recognition.y_mm ||

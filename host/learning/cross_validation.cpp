@@ -137,26 +137,42 @@ class FoldTrial {
   /// Fills in what the model says of a press, or of a group.
   void judge(const Press& press, std::span<const TouchEvidence> evidence,
              const std::vector<LabelScore>& scores, HeldOut& unknown) const {
-    unknown.truth = *label_of(press.label);
+    const std::size_t truth = *label_of(press.label);
+    unknown.truth = truth;
     unknown.touches = evidence.size();
     std::ranges::transform(scores, std::back_inserter(unknown.log_evidence),
                            &LabelScore::log_evidence);
     unknown.log_density = log_densities(evidence.front());
-    unknown.stranger_fit = stranger_fit_of(evidence, scores, unknown.truth);
+    std::vector<std::size_t> labels;  // with maps, but the true one
+    for (std::size_t label = 0; label < labels_.size(); ++label) {
+      if (label != truth && scores[label].maps > 0) {
+        labels.push_back(label);
+      }
+    }
+    const auto in_contact = std::ranges::count_if(evidence, &TouchEvidence::in_contact);
+    if (model_.table && labels.size() >= 2 && in_contact > 0) {
+      unknown.stranger_fit =
+          StrangerFit{best_fit(evidence, scores, labels), static_cast<std::size_t>(in_contact)};
+    }
     if (unknown.half == 0) {
-      unknown.error_mm = pose_error_of(evidence, unknown.truth, *press.T_object_robot);
+      unknown.error_mm = pose_error_of(evidence, truth, *press.T_object_robot);
     }
     // A press of which nothing is In Contact says nothing of its object.
     if (unknown.half || !evidence.front().in_contact()) {
       return;
     }
-    const auto z_at = [&](const std::optional<Pose>& T_object_robot) {
-      const std::optional<Fit> fit = fit_of(evidence, scores, unknown.truth, T_object_robot);
-      return fit ? std::optional(fit->z) : std::nullopt;
-    };
-    unknown.fit_z = z_at(press.T_object_robot);
-    if (press.T_object_robot && model_.table) {
-      unknown.best_fit_z = z_at({});
+    labels.insert(labels.begin(), truth);  // the best where another is as good
+    if (!press.T_object_robot) {
+      unknown.fit_z = best_fit(evidence, scores, labels).z;
+      return;
+    }
+    unknown.fit_z = evidence_fit(evidence, *press.T_object_robot,
+                                 hypotheses_[scores[truth].best_map].compared(),
+                                 contact_for(labels_[truth]), {}, 0)
+                        .value()
+                        .z;
+    if (model_.table) {
+      unknown.best_fit_z = best_fit(evidence, scores, labels).z;
     }
   }
 
@@ -207,53 +223,15 @@ class FoldTrial {
     return densities;
   }
 
-  /// How a press fits the best of these objects at about the best pose.
-  std::optional<Fit> best_fit(std::span<const TouchEvidence> press,
-                              const std::vector<LabelScore>& scores,
-                              std::span<const std::size_t> labels) const {
+  /// How a press with an element In Contact fits the best of these objects at about the best pose.
+  Fit best_fit(std::span<const TouchEvidence> press, const std::vector<LabelScore>& scores,
+               std::span<const std::size_t> labels) const {
     const std::size_t label = *std::ranges::max_element(
         labels, {}, [&](std::size_t one) { return scores[one].best_log_likelihood; });
     const LabelScore& at = scores[label];
     return best_fit_near(press, at.best_pose, hypotheses_[at.best_map].compared(),
-                         contact_for(labels_[label]), 0);
-  }
-
-  /// The labels but one that have maps.
-  std::vector<std::size_t> others_of(std::size_t label,
-                                     const std::vector<LabelScore>& scores) const {
-    std::vector<std::size_t> others;
-    for (std::size_t other = 0; other < labels_.size(); ++other) {
-      if (other != label && scores[other].maps > 0) {
-        others.push_back(other);
-      }
-    }
-    return others;
-  }
-
-  /// How a press fits its object at its pose, or where that is unknown, the best object.
-  std::optional<Fit> fit_of(std::span<const TouchEvidence> press,
-                            const std::vector<LabelScore>& scores, std::size_t truth,
-                            const std::optional<Pose>& T_object_robot) const {
-    if (T_object_robot) {
-      return evidence_fit(press, *T_object_robot, hypotheses_[scores[truth].best_map].compared(),
-                          contact_for(labels_[truth]), {}, 0);
-    }
-    std::vector<std::size_t> labels = others_of(truth, scores);
-    labels.insert(labels.begin(), truth);  // the best where another is as good
-    return best_fit(press, scores, labels);
-  }
-
-  /// See HeldOut::stranger_fit.
-  std::optional<StrangerFit> stranger_fit_of(std::span<const TouchEvidence> press,
-                                             const std::vector<LabelScore>& scores,
-                                             std::size_t truth) const {
-    const std::vector<std::size_t> others = others_of(truth, scores);
-    const auto in_contact = std::ranges::count_if(press, &TouchEvidence::in_contact);
-    if (!model_.table || others.size() < 2 || in_contact == 0) {
-      return {};
-    }
-    return StrangerFit{best_fit(press, scores, others).value(),
-                       static_cast<std::size_t>(in_contact)};
+                         contact_for(labels_[label]), 0)
+        .value();
   }
 
   /// Errors of the places of presses at known poses.

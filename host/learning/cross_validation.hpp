@@ -66,19 +66,6 @@ PoseLattice fine_lattice(const std::vector<Press>& presses, double spacing_mm);
 /// @throws Error on an array whose centre is more than a bin beyond the lattice's x or y
 void require_within(const std::vector<Press>& presses, const PoseLattice& lattice);
 
-/// What it may cost to try presses on bins, alone and in groups.
-struct TrialCost {
-  std::size_t maps = 0;     ///< on which each press is tried
-  double spacing_mm = 0.0;  ///< of the elements
-  double minutes = 0.0;     ///< of one core
-};
-
-/// The lattice, or the finest of its region that the cost allows, but none coarser than presses at
-/// unknown poses are placed on.
-/// @throws Error where even the coarsest would take too long, or too much memory
-PoseLattice affordable_lattice(PoseLattice lattice, const std::vector<Press>& presses,
-                               const ContactClassifier& classifier, const TrialCost& cost);
-
 /// A table that a calibration may learn: what of a map it is over, and how many levels of readings
 /// it tells apart, No Contact included, 2 to most_reading_levels.
 struct TableKind {
@@ -118,6 +105,13 @@ struct LearnedPresses {
 /// @throws Error as observed_map()
 LearnedPresses with_maps(std::vector<Press> presses, LearnedReadings readings,
                          const CalibrationSettings& settings);
+
+/// The lattice, or the finest of its region on which so many minutes of one core are enough to try
+/// presses, alone and in groups, on so many maps each; none coarser than presses at unknown poses
+/// are placed on.
+/// @throws Error where even the coarsest would take too long, or too much memory
+PoseLattice affordable_lattice(PoseLattice lattice, const LearnedPresses& learned, std::size_t maps,
+                               double minutes);
 
 /// How the presses learn a table.
 TableLearning table_learning(const TableKind& kind, const LearnedPresses& learned,

@@ -159,13 +159,8 @@ void learn_from(const CalibrationTask& task, const MapRequest& request, LearnedM
 /// Runs `learn`, or says why no sensor can be learned. Where none is, one of other maps goes.
 template <typename Learn>
 void or_say_why_not(const MapRequest& request, LearnedMaps& learned, const Learn& learn) {
-  try {
-    learn();
-  } catch (const Error& error) {
-    if (error.fault() != Fault::input) {
-      throw;
-    }
-    learned.words.push_back(fmt::format("no sensor model: {}", error.what()));
+  if (const auto fault = input_fault_of(learn)) {
+    learned.words.push_back(fmt::format("no sensor model: {}", *fault));
   }
   std::error_code ignored;
   if (!learned.sensor && !request.output.empty() &&
@@ -177,14 +172,9 @@ void or_say_why_not(const MapRequest& request, LearnedMaps& learned, const Learn
 
 /// Whether learn_maps() wrote a sensor model; none where it is no sensor model.
 std::optional<bool> is_of_maps(const std::filesystem::path& file) {
-  try {
-    return !read_sensor_model(file).maps.empty();
-  } catch (const Error& error) {
-    if (error.fault() != Fault::input) {
-      throw;
-    }
-    return {};
-  }
+  std::optional<bool> own;
+  input_fault_of([&] { own = !read_sensor_model(file).maps.empty(); });
+  return own;
 }
 
 }  // namespace

@@ -13,9 +13,9 @@
 
 #include "model/bounding_box.hpp"
 #include "model/element_spacing.hpp"
+#include "model/refuse.hpp"
 #include "model/touch_evidence.hpp"
 #include "palpate/contact.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -212,10 +212,9 @@ OccupancyGrid MapSums::map(const std::string& label, const CellRange& range, boo
 
 OccupancyGrid MapSums::sum(const std::string& label, double radius_mm) const {
   if (touched_.empty()) {
-    throw Error(Fault::input,
-                fmt::format("object '{}': no element of any touch is In Contact or No "
-                            "Contact; check the threshold and the pressure's unit",
-                            label));
+    refuse(fmt::format("object '{}'", label),
+           "no element of any touch is In Contact or No Contact; check the threshold and the "
+           "pressure's unit");
   }
   OccupancyGrid sum =
       map(label, cover(touched_.lower, touched_.upper, radius_mm, options_.cell_mm), false);

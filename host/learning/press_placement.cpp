@@ -78,23 +78,20 @@ std::vector<float> PressPlacer::log_likelihoods(std::span<const TouchEvidence> p
     reach_squared = std::max(reach_squared, glm::dot(element.from_pivot_mm, element.from_pivot_mm));
   }
   cover(std::sqrt(reach_squared));
-  sum_rest(elements);
-
+  constexpr auto place = &Element::from_pivot_mm;
+  if (!std::ranges::equal(elements, resting_, {}, place, place)) {
+    const auto none = [&](Reading) { return &no_contact_; };
+    resting_ = elements;
+    rest_.assign(static_cast<std::size_t>(lattice_.bins()), 0.0F);
+    add(elements, none, rest_);
+  }
   std::vector<float> bins = rest_;
-  tbb::parallel_for(0, lattice_.theta_rad.count, [&](int theta) {
-    std::vector<const float*> samples;
-    const glm::dmat2 turn = rotation(lattice_.theta_rad.centre(theta));
-    for (const Element& element : elements) {
-      if (element.reading != Reading::no_contact) {
-        const std::vector<float>& excess =
-            is_contact(element.reading)
-                ? contact_excess_[static_cast<std::size_t>(element.reading) - 1]
-                : unknown_excess_;
-        samples.push_back(excess.data() + first_sample(turn * element.from_pivot_mm));
-      }
-    }
-    add(samples, bins.data() + lattice_.plane() * theta);
-  });
+  const auto excess = [&](Reading reading) -> const std::vector<float>* {
+    return reading == Reading::no_contact ? nullptr
+           : is_contact(reading)          ? &contact_excess_[static_cast<std::size_t>(reading) - 1]
+                                          : &unknown_excess_;
+  };
+  add(elements, excess, bins);
   return bins;
 }
 
@@ -185,25 +182,6 @@ void PressPlacer::cover(double reach_mm) {
   }
 }
 
-void PressPlacer::sum_rest(const std::vector<Element>& elements) {
-  if (std::ranges::equal(elements, resting_, {}, &Element::from_pivot_mm)) {
-    return;
-  }
-  resting_.clear();
-  for (const Element& element : elements) {
-    resting_.push_back(element.from_pivot_mm);
-  }
-  rest_.assign(static_cast<std::size_t>(lattice_.bins()), 0.0F);
-  tbb::parallel_for(0, lattice_.theta_rad.count, [&](int theta) {
-    std::vector<const float*> samples;
-    const glm::dmat2 turn = rotation(lattice_.theta_rad.centre(theta));
-    for (const glm::dvec2& place : resting_) {
-      samples.push_back(no_contact_.data() + first_sample(turn * place));
-    }
-    add(samples, rest_.data() + lattice_.plane() * theta);
-  });
-}
-
 std::size_t PressPlacer::first_sample(const glm::dvec2& turned) const {
   const int u = x_.nearest(lattice_.x_mm.centre(0) + turned.x);
   const int v = y_.nearest(lattice_.y_mm.centre(0) + turned.y);
@@ -213,17 +191,29 @@ std::size_t PressPlacer::first_sample(const glm::dvec2& turned) const {
          static_cast<std::size_t>(u / x_.per_step);
 }
 
-void PressPlacer::add(std::span<const float* const> elements, float* bins) const {
+template <typename TableOf>
+void PressPlacer::add(const std::vector<Element>& elements, const TableOf& table_of,
+                      std::vector<float>& bins) const {
   const auto nx = static_cast<std::size_t>(lattice_.x_mm.count);
   const auto ny = static_cast<std::size_t>(lattice_.y_mm.count);
   const std::size_t columns = (nx + sum_lanes - 1) / sum_lanes * sum_lanes;
-  std::vector<float> sums(ny * columns);
-  sum_planes(elements, static_cast<std::size_t>(x_.columns), ny, columns, sums.data());
-  for (std::size_t j = 0; j < ny; ++j) {
-    for (std::size_t i = 0; i < nx; ++i) {
-      bins[j * nx + i] += sums[j * columns + i];
+  tbb::parallel_for(0, lattice_.theta_rad.count, [&](int theta) {
+    std::vector<const float*> samples;
+    const glm::dmat2 turn = rotation(lattice_.theta_rad.centre(theta));
+    for (const Element& element : elements) {
+      if (const std::vector<float>* table = table_of(element.reading)) {
+        samples.push_back(table->data() + first_sample(turn * element.from_pivot_mm));
+      }
     }
-  }
+    std::vector<float> sums(ny * columns);
+    sum_planes(samples, static_cast<std::size_t>(x_.columns), ny, columns, sums.data());
+    float* plane = bins.data() + lattice_.plane() * theta;
+    for (std::size_t j = 0; j < ny; ++j) {
+      for (std::size_t i = 0; i < nx; ++i) {
+        plane[j * nx + i] += sums[j * columns + i];
+      }
+    }
+  });
 }
 
 PoseLattice placing_lattice(std::span<const TrainingMap> maps, double step_mm, double step_rad) {

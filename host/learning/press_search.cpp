@@ -1,4 +1,4 @@
-#include "learning/press_search.hpp"
+#include "learning/press_placement.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "learning/press_placement.hpp"
+#include "learning/local_search.hpp"
 #include "model/bounding_box.hpp"
 #include "model/map_likelihood.hpp"
 #include "model/touch_evidence.hpp"

@@ -12,8 +12,8 @@
 #include "learning/progress.hpp"
 #include "learning/setup_judge.hpp"
 #include "model/element_spacing.hpp"
+#include "model/refuse.hpp"
 #include "model/touch_evidence.hpp"
-#include "palpate/error.hpp"
 
 namespace palpate {
 
@@ -55,9 +55,9 @@ std::vector<Press> without_unknown(const std::vector<Press>& presses,
     }
   }
   if (known.empty()) {
-    throw Error(Fault::input, fmt::format("{}: all elements are Unknown, as in all other touches: "
-                                          "dead, without a number, or of the same pressure",
-                                          first));
+    refuse(first,
+           "all elements are Unknown, as in all other touches: dead, without a number, or of the "
+           "same pressure");
   }
   if (const std::size_t left_out = presses.size() - known.size(); left_out > 0) {
     warnings.push_back(fmt::format(
@@ -78,10 +78,8 @@ PoseLattice affordable(const CalibrationSettings& settings, const LearnedPresses
     // Among the maps of folds, a touch is tried on the one that was built without it.
     maps += settings.given.empty() ? 1 : std::min(own, settings.most_maps);
   }
-  return affordable_lattice(settings.bins->lattice, learned.presses, learned.readings.classifier,
-                            {.maps = maps,
-                             .spacing_mm = learned.readings.spacing_mm,
-                             .minutes = given ? minutes_at_bins : minutes});
+  return affordable_lattice(settings.bins->lattice, learned, maps,
+                            given ? minutes_at_bins : minutes);
 }
 
 std::vector<std::string> labels_of(const std::vector<TrainingMap>& maps) {
@@ -293,15 +291,6 @@ SensorCalibration calibrate_sensor(const std::vector<Press>& given_presses,
     throw Error(Fault::input, "no touches; give recordings with touches");
   }
   const bool known_poses = at_known_poses(given_presses);
-  for (const Press& press : given_presses) {
-    const Press& first = given_presses.front();
-    if (press.T_object_robot.has_value() != first.T_object_robot.has_value()) {
-      throw Error(Fault::input,
-                  fmt::format("{}: its pose is {}known, unlike that of {}; calibrate "
-                              "from one kind",
-                              press.name, press.T_object_robot ? "" : "un", first.name));
-    }
-  }
   CalibrationSettings settings = options;
   settings.readings.spacing_mm = spacing_mm_of(given_presses);
   if (settings.tables.empty()) {

@@ -79,8 +79,8 @@ struct SensorCalibration {
 /// @param given maps to compare presses with, with their mean level where a table is over that;
 /// without: maps of other presses
 /// @throws Error where no press has a map of its object that it is no part of, where presses tell
-/// no threshold or have no pressure above it, where some poses are known and some not, and as
-/// observed_map() and learn_table() do; what `progress` throws
+/// no threshold or have no pressure above it, and as observed_map() and learn_table() do; what
+/// `progress` throws
 SensorCalibration calibrate_sensor(const std::vector<Press>& presses,
                                    const std::vector<OccupancyGrid>& given,
                                    const CalibrationSettings& options,

@@ -18,29 +18,18 @@
 
 #include "learning/progress.hpp"
 #include "learning/setup_judge.hpp"
+#include "model/angle_unit.hpp"
 #include "model/bounding_box.hpp"
 #include "model/map_likelihood.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 #include "palpate/fit.hpp"
 
 namespace palpate {
 
 namespace {
 
-/// A unit that poses may really have.
-struct PoseUnit {
-  bool metres = false;
-  bool degrees = false;
-
-  Setup of(Setup setup) const {
-    setup.mm = metres ? 1000.0 : 1.0;
-    setup.rad = degrees ? std::numbers::pi / 180.0 : 1.0;
-    return setup;
-  }
-};
-
-/// Metres, degrees or both, where the numbers allow for it.
-std::vector<PoseUnit> possible_units(const SetupJudge& judge, const Setup& setup) {
+/// The set-up with poses in metres, degrees or both, where the numbers allow for it.
+std::vector<Setup> in_other_units(const SetupJudge& judge, const Setup& setup) {
   constexpr double circle = 2.0 * std::numbers::pi;
   BoundingBox places;
   double most_angle = 0.0;
@@ -53,28 +42,33 @@ std::vector<PoseUnit> possible_units(const SetupJudge& judge, const Setup& setup
   const bool may_be_metres = places.diagonal() < 0.1 * array_reach_mm(setup.elements_mm);
   const bool may_be_degrees = most_angle > circle;
   // An angle that counts turns exceeds a circle in radians, too.
-  std::vector<PoseUnit> units{{true, true}, {true, false}, {false, true}};
-  std::erase_if(units, [&](const PoseUnit& unit) {
-    return (unit.metres && !may_be_metres) || (unit.degrees && !may_be_degrees);
-  });
-  return units;
+  std::vector<Setup> others;
+  for (const auto& [metres, degrees] : {std::pair{true, true}, {true, false}, {false, true}}) {
+    if ((!metres || may_be_metres) && (!degrees || may_be_degrees)) {
+      others.push_back(setup);
+      others.back().mm = metres ? 1000.0 : 1.0;
+      others.back().rad = degrees ? radians(1.0) : 1.0;
+    }
+  }
+  return others;
 }
 
 /// Poses in degrees or metres.
 void check_units(SetupSearch& search) {
-  std::optional<PoseUnit> best;
+  std::optional<Setup> best;
   double gain = least_nats;
-  for (const PoseUnit& unit : possible_units(search.judge, search.setup)) {
-    const double gained = search.judge.nats(unit.of(search.setup)) - search.nats;
+  for (const Setup& other : in_other_units(search.judge, search.setup)) {
+    const double gained = search.judge.nats(other) - search.nats;
     if (gained > gain) {
-      best = unit;
+      best = other;
       gain = gained;
     }
   }
   if (!best) {
     return;
   }
-  const auto [metres, degrees] = *best;
+  const bool metres = best->mm != 1.0;
+  const bool degrees = best->rad != 1.0;
   const std::string option =
       fmt::format("pose-unit {},{}", metres ? "m" : "mm", degrees ? "deg" : "rad");
   search.check.findings.push_back(
@@ -84,7 +78,7 @@ void check_units(SetupSearch& search) {
                    metres ? "metres" : "", metres && degrees ? " and " : "",
                    degrees ? "degrees" : "", option),
        {option}});
-  search.setup = best->of(search.setup);
+  search.setup = *best;
   search.nats += gain;
 }
 
@@ -107,14 +101,13 @@ bool at_one_place(const SetupJudge& judge, const Setup& setup) {
 /// array does not make; none where all touches are at one angle.
 std::optional<Pose> mount_found_widely(const SetupJudge& judge, const Setup& setup,
                                        const std::function<void(double)>& progress) {
-  std::vector<PoseUnit> units = possible_units(judge, setup);
-  units.insert(units.begin(), PoseUnit());
+  std::vector<Setup> units = in_other_units(judge, setup);
+  units.insert(units.begin(), setup);
   const std::vector<ElementOrder> orders = orders_but_for_turns(setup.elements_mm);
   Progress work(static_cast<double>(units.size() * orders.size()), progress);
   std::optional<Summit<Pose>> best;
-  for (const PoseUnit& unit : units) {
+  for (Setup& tried : units) {
     for (const ElementOrder& order : orders) {
-      Setup tried = unit.of(setup);
       tried.elements_mm = order.elements_mm;
       if (!at_one_angle(judge, tried.rad)) {
         const Summit<Pose> found = search_mount(judge, tried);
@@ -305,20 +298,18 @@ std::optional<SetupFinding> suspected_order(Device& device, std::span<const Reco
   if (few.empty()) {
     return {};
   }
-  try {
+  std::optional<SetupFinding> found;
+  input_fault_of([&] {
     SetupJudge judge(device, few, options, most_touches);
     SetupSearch search{judge, setup};
     if (!at_one_place(judge, setup)) {
       check_order(search);
     }
-    return search.check.findings.empty() ? std::nullopt
-                                         : std::optional(search.check.findings.front());
-  } catch (const Error& error) {
-    if (error.fault() != Fault::input) {
-      throw;
+    if (!search.check.findings.empty()) {
+      found = search.check.findings.front();
     }
-    return {};
-  }
+  });
+  return found;
 }
 
 SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
@@ -328,26 +319,21 @@ SetupCheck check_setup(Device& device, std::span<const Recording> recordings,
   for (const Recording& recording : recordings) {
     all.push_back(&recording);
     if (!has_array(recording, given.elements_mm)) {
-      throw Error(Fault::input,
-                  fmt::format("{}: its array is not that of all touches; check recordings of one "
-                              "array that does not change",
-                              recording.path));
+      refuse(recording.path,
+             "its array is not that of all touches; check recordings of one array that does not "
+             "change");
     }
   }
   const std::vector<SetupFinding> logged = findings_of_logs(recordings);
   SetupCheck check{.elements_mm = given.elements_mm};
   std::optional<SetupJudge> judge;
-  try {
-    judge.emplace(device, all, options);
-  } catch (const Error& error) {
-    if (error.fault() != Fault::input || logged.empty()) {
-      throw;
-    }
-    // What is wrong with the logs may be why there are few touches.
-    check.remarks.emplace_back(error.what());
-  }
-  if (judge) {
+  const auto fault = input_fault_of([&] { judge.emplace(device, all, options); });
+  if (!fault) {
     check = checked_widely(*judge, given, progress);
+  } else if (logged.empty()) {
+    throw Error(Fault::input, *fault);
+  } else {  // what is wrong with the logs may be why there are few touches
+    check.remarks.push_back(*fault);
   }
   check.findings.insert(check.findings.end(), logged.begin(), logged.end());
   return check;

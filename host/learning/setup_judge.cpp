@@ -18,8 +18,8 @@
 #include <glm/geometric.hpp>
 
 #include "model/map_likelihood.hpp"
+#include "model/refuse.hpp"
 #include "model/touch_evidence.hpp"
-#include "palpate/error.hpp"
 #include "palpate/fit.hpp"
 
 namespace palpate {
@@ -58,16 +58,13 @@ SetupJudge::SetupJudge(Device& device, std::span<const Recording* const> recordi
   }
   for (const auto& [object, given] : touches_) {
     if (given.empty()) {
-      throw Error(Fault::input,
-                  fmt::format("object '{}': no element is in contact in any of its touches; lower "
-                              "`threshold`, or look at the array's wiring and its baseline",
-                              object));
+      refuse(fmt::format("object '{}'", object),
+             "no element is in contact in any of its touches; lower `threshold`, or look at the "
+             "array's wiring and its baseline");
     }
     if (given.size() < 4) {
-      throw Error(Fault::input,
-                  fmt::format("object '{}': {} touches in contact; four or more of every object "
-                              "tell its set-up",
-                              object, given.size()));
+      refuse(fmt::format("object '{}'", object),
+             "{} touches in contact; four or more of every object tell its set-up", given.size());
     }
   }
   if (all_in_contact) {
@@ -80,20 +77,14 @@ SetupJudge::SetupJudge(Device& device, std::span<const Recording* const> recordi
 
 double SetupJudge::nats(const Setup& setup) {
   double sum = 0.0;
-  try {
-    visit(setup, [&](const TriedTouch& given, const Touch& touch, const OccupancyGrid& map) {
-      const MapLikelihood likelihood(map, contact_);
-      for (std::size_t e = 0; e < given.readings.size(); ++e) {
-        sum += likelihood.at(given.readings[e], touch.T_robot_sensor * touch.elements_mm[e]);
-      }
-    });
-  } catch (const Error& error) {
-    if (error.fault() != Fault::input) {
-      throw;
+  const auto add = [&](const TriedTouch& given, const Touch& touch, const OccupancyGrid& map) {
+    const MapLikelihood likelihood(map, contact_);
+    for (std::size_t e = 0; e < given.readings.size(); ++e) {
+      sum += likelihood.at(given.readings[e], touch.T_robot_sensor * touch.elements_mm[e]);
     }
-    return -1e300;  // so far apart that no map holds them
-  }
-  return sum;
+  };
+  const bool too_far_apart = input_fault_of([&] { visit(setup, add); }).has_value();
+  return too_far_apart ? -1e300 : sum;
 }
 
 SetupFit SetupJudge::fit(const Setup& setup) {

@@ -32,12 +32,12 @@ double bins_of(const PoseLattice& lattice) {
 }
 
 /// Additions to try all presses on a bin.
-double additions_per_bin(const std::vector<Press>& presses, const ContactClassifier& classifier,
-                         std::size_t maps) {
+double additions_per_bin(const LearnedPresses& learned, std::size_t maps) {
+  const ContactModel classifier{.classifier = learned.readings.classifier};
   double readings = 0.0;
-  for (const Press& press : presses) {
+  for (const Press& press : learned.presses) {
     readings += readings_per_press;
-    for (const TouchEvidence& touch : evidence_of(press.touches, {.classifier = classifier})) {
+    for (const TouchEvidence& touch : evidence_of(press.touches, classifier)) {
       // All elements are added for No Contact everywhere, and all that read otherwise once more.
       readings += 2.0 * static_cast<double>(touch.readings.size()) -
                   static_cast<double>(std::ranges::count(touch.readings, Reading::no_contact));
@@ -172,18 +172,18 @@ void require_within(const std::vector<Press>& presses, const PoseLattice& lattic
   }
 }
 
-PoseLattice affordable_lattice(PoseLattice lattice, const std::vector<Press>& presses,
-                               const ContactClassifier& classifier, const TrialCost& cost) {
-  const double per_bin = additions_per_bin(presses, classifier, cost.maps);
-  const double bins = std::min(most_bins, cost.minutes * additions_per_minute / per_bin);
+PoseLattice affordable_lattice(PoseLattice lattice, const LearnedPresses& learned, std::size_t maps,
+                               double minutes) {
+  const double per_bin = additions_per_bin(learned, maps);
+  const double bins = std::min(most_bins, minutes * additions_per_minute / per_bin);
   const double wider = std::cbrt(bins_of(lattice) / bins);
   const auto coarsen = [&](Axis& axis, double widest) {
     const double fewest = std::ceil((axis.upper - axis.lower) / widest);
     const double count = std::max({1.0, fewest, axis.count / wider});
     axis.count = static_cast<int>(std::min<double>(axis.count, count));
   };
-  coarsen(lattice.x_mm, cost.spacing_mm);
-  coarsen(lattice.y_mm, cost.spacing_mm);
+  coarsen(lattice.x_mm, learned.readings.spacing_mm);
+  coarsen(lattice.y_mm, learned.readings.spacing_mm);
   coarsen(lattice.theta_rad, placing_step_rad);
   if (bins_of(lattice) > std::min(most_bins, most_minutes * additions_per_minute / per_bin)) {
     throw Error(
@@ -191,7 +191,7 @@ PoseLattice affordable_lattice(PoseLattice lattice, const std::vector<Press>& pr
         fmt::format("to try {} touches on bins over {:g} x {:g} mm would take too long; give "
                     "`bins` with the `x-mm` and `y-mm` where an unknown may lie, or fewer "
                     "`frames`",
-                    presses.size(), lattice.x_mm.upper - lattice.x_mm.lower,
+                    learned.presses.size(), lattice.x_mm.upper - lattice.x_mm.lower,
                     lattice.y_mm.upper - lattice.y_mm.lower));
   }
   return lattice;

@@ -9,10 +9,10 @@
 #include <tbb/parallel_for.h>
 
 #include "learning/observed_map.hpp"
-#include "learning/press_search.hpp"
+#include "learning/press_placement.hpp"
 #include "learning/progress.hpp"
 #include "model/element_spacing.hpp"
-#include "palpate/error.hpp"
+#include "model/refuse.hpp"
 
 namespace palpate {
 
@@ -378,9 +378,8 @@ UnposedMaps unposed_maps(std::span<const Touch> presses, const std::string& labe
     }
   }
   if (placeable.empty()) {
-    throw Error(Fault::input, fmt::format("object '{}': no press has an element In Contact; check "
-                                          "the threshold and the pressure's unit",
-                                          label));
+    refuse(fmt::format("object '{}'", label),
+           "no press has an element In Contact; check the threshold and the pressure's unit");
   }
   tbb::parallel_for(std::size_t{0}, placeable.size(), [&](std::size_t p) {
     placeable[p].image =

@@ -53,10 +53,7 @@ double log_sum(double a, double b) {
 /// Linear between the nodes of one level, constant beyond them.
 double interpolate(const LikelihoodTable& table, Reading level, double log_odds,
                    std::size_t object) {
-  const std::size_t set = table.sets() == 1 ? 0 : object;
-  const std::size_t row = set * table.levels() + static_cast<std::size_t>(level);
-  const std::span<const double> nats =
-      std::span(table.log_likelihood).subspan(row * table.nodes, table.nodes);
+  const std::span<const double> nats = numbers_of(table, level, object);
   const double last = static_cast<double>(table.nodes - 1);
   const double place = std::clamp(
       (log_odds - table.first_log_odds) * last / (table.last_log_odds - table.first_log_odds), 0.0,

@@ -38,13 +38,11 @@ MapLikelihood::MapLikelihood(const OccupancyGrid& map, const ContactModel& conta
     nodes_ = table->nodes;
     last_node_ = static_cast<double>(nodes_ - 1);
     first_log_odds_ = table->first_log_odds;
-    nodes_per_nat_ = last_node_ / (table->last_log_odds - table->first_log_odds);
+    nodes_per_nat_ = nodes_per_nat(*table);
     sets_ = table->sets();
     object_ = object;
-    const std::size_t set = sets_ == 1 ? 0 : object;
-    const auto first =
-        table->log_likelihood.begin() + static_cast<std::ptrdiff_t>(set * levels_ * nodes_);
-    nats_.assign(first, first + static_cast<std::ptrdiff_t>(levels_ * nodes_));
+    const double* const first = numbers_of(*table, Reading::no_contact, object).data();
+    nats_.assign(first, first + levels_ * nodes_);
   }
 }
 

@@ -85,6 +85,17 @@ std::optional<Fit> evidence_fit(std::span<const TouchEvidence> touches, const Po
 std::vector<Reading> classify(const Touch& touch, const ContactModel& model,
                               std::vector<Reading> reuse);
 
+/// A table's numbers of a level for an object, [node]; those of the levels above it follow.
+inline std::span<const double> numbers_of(const LikelihoodTable& table, Reading level,
+                                          std::size_t object) {
+  const std::size_t of_a_set = table.levels() * table.nodes;
+  const std::size_t set = table.log_likelihood.size() == of_a_set ? 0 : object;
+  const std::size_t first = set * of_a_set + static_cast<std::size_t>(level) * table.nodes;
+  return std::span(table.log_likelihood).subspan(first, table.nodes);
+}
+inline double nodes_per_nat(const LikelihoodTable& table) {
+  return static_cast<double>(table.nodes - 1) / (table.last_log_odds - table.first_log_odds);
+}
 /// @throws Error: a table of so many levels and sets of numbers has none for this reading or object
 [[noreturn]] void refuse_reading(std::size_t levels, std::size_t sets, Reading reading,
                                  std::size_t object);

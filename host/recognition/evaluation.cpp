@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <set>
 #include <utility>
 
@@ -47,13 +48,9 @@ namespace {
 
 const std::string none_answer(none_label);
 
-/// Whether the record is counted.
-using Choice = bool (*)(const JudgedRecord&);
-
-bool of_unknown_class(const JudgedRecord& record) { return !record.of_known_class(); }
-
-/// None where no record is chosen.
-std::optional<Scores> scores_of(std::span<const JudgedRecord> records, Choice chosen) {
+/// @param known whether classes are known that count; none: all classes
+/// @returns none where no record counts
+std::optional<Scores> scores_of(std::span<const JudgedRecord> records, std::optional<bool> known) {
   Scores scores;
   const auto bins = static_cast<double>(scores.bins.size());
   for (std::size_t k = 0; k < scores.bins.size(); ++k) {
@@ -61,7 +58,7 @@ std::optional<Scores> scores_of(std::span<const JudgedRecord> records, Choice ch
     scores.bins[k].upper = static_cast<double>(k + 1) / bins;
   }
   for (const JudgedRecord& record : records) {
-    if (!chosen(record)) {
+    if (known && record.of_known_class() != *known) {
       continue;
     }
     const auto bin = static_cast<std::size_t>(std::max(bins * record.confidence(), 0.0));
@@ -131,24 +128,14 @@ std::vector<ClassScores> classes_of(std::span<const JudgedRecord> records,
   return result;
 }
 
-/// What tells known from unknown classes; larger for known ones.
-struct KnownScore {
-  const char* name;
-  std::optional<double> (*of)(const JudgedRecord& record);
-};
-constexpr KnownScore known_scores[] = {
-    {"1 - none",
-     [](const JudgedRecord& record) {
-       return record.none ? std::optional(1.0 - *record.none) : std::nullopt;
-     }},
-    {"fit.z", [](const JudgedRecord& record) { return record.fit_z; }}};
-
-std::optional<KnownAgainstUnknown> compare_by(const KnownScore& score,
+/// @param score_of a record, larger for known classes; none where it has none
+template <typename Score>
+std::optional<KnownAgainstUnknown> compare_by(const char* name, const Score& score_of,
                                               std::span<const JudgedRecord> records) {
   std::vector<double> of_known;
   std::vector<double> of_unknown;
   for (const JudgedRecord& record : records) {
-    if (const auto value = score.of(record)) {
+    if (const std::optional<double> value = score_of(record)) {
       (record.of_known_class() ? of_known : of_unknown).push_back(*value);
     }
   }
@@ -157,7 +144,7 @@ std::optional<KnownAgainstUnknown> compare_by(const KnownScore& score,
   }
   const double area = told_apart(of_unknown, of_known);
   return KnownAgainstUnknown{
-      .score = score.name,
+      .score = name,
       .known = of_known.size(),
       .unknown = of_unknown.size(),
       .area = area,
@@ -165,14 +152,13 @@ std::optional<KnownAgainstUnknown> compare_by(const KnownScore& score,
 }
 
 std::optional<KnownAgainstUnknown> known_against_unknown(std::span<const JudgedRecord> records) {
-  std::optional<KnownAgainstUnknown> best;
-  for (const KnownScore& score : known_scores) {
-    const auto by_score = compare_by(score, records);
-    if (by_score && (!best || by_score->records() > best->records())) {
-      best = by_score;
-    }
-  }
-  return best;
+  const auto known = [](const JudgedRecord& record) {
+    return record.none ? std::optional(1.0 - *record.none) : std::nullopt;
+  };
+  const auto by_none = compare_by("1 - none", known, records);
+  const auto by_fit = compare_by("fit.z", std::mem_fn(&JudgedRecord::fit_z), records);
+  const bool by_more = by_fit && (!by_none || by_fit->records() > by_none->records());
+  return by_more ? by_fit : by_none;
 }
 
 std::optional<Median> median_of(std::span<const JudgedRecord> records,
@@ -208,11 +194,10 @@ double JudgedRecord::answer_probability() const {
 
 Evaluation evaluate(std::span<const JudgedRecord> records) {
   Evaluation evaluation;
-  evaluation.all = scores_of(records, [](const JudgedRecord&) { return true; }).value();
-  evaluation.unknown = scores_of(records, of_unknown_class);
+  evaluation.all = scores_of(records, {}).value();
+  evaluation.unknown = scores_of(records, false);
   if (evaluation.unknown) {
-    evaluation.known =
-        scores_of(records, [](const JudgedRecord& record) { return record.of_known_class(); });
+    evaluation.known = scores_of(records, true);
     evaluation.known_against_unknown = known_against_unknown(records);
   }
   evaluation.answers = answers_of(records);

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+
+#include "estimation/hypotheses.hpp"
 
 namespace palpate {
 
@@ -199,16 +202,7 @@ std::vector<double> label_probabilities(const Estimate& estimate, const Temperin
   for (std::size_t i = 0; i < logs.size(); ++i) {
     logs[i] = tempering.tempered(logs[i], i);
   }
-  const double largest = *std::max_element(logs.begin(), logs.end());
-  double total = 0.0;
-  for (double& p : logs) {
-    p = std::exp(p - largest);
-    total += p;
-  }
-  for (double& p : logs) {
-    p /= total;
-  }
-  return logs;
+  return normalised(std::move(logs));
 }
 
 std::vector<ProbabilityInterval> label_bounds(const Estimate& estimate,

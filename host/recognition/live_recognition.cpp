@@ -120,12 +120,10 @@ void LiveRecognition::leave_out(std::size_t touch, bool out) {
   });
 }
 
-void LiveRecognition::between_touches(std::function<void()> work) { push(std::move(work)); }
-
-void LiveRecognition::push(std::function<void()> job) {
+void LiveRecognition::between_touches(std::function<void()> work) {
   {
     const std::lock_guard lock(mutex_);
-    jobs_.push_back(std::move(job));
+    jobs_.push_back(std::move(work));
   }
   changed_.notify_all();
 }
@@ -263,7 +261,7 @@ void LiveRecognition::hand_on(const std::optional<DetectedTouch>& touch) {
     ++state_.without_pose;
     return;
   }
-  push([this, used = UsedTouch{*touch, counters().lost}, taken = taken_]() mutable {
+  between_touches([this, used = UsedTouch{*touch, counters().lost}, taken = taken_]() mutable {
     use(std::move(used), taken);
   });
 }

@@ -131,8 +131,6 @@ class LiveRecognition {
   /// The best next touch of a grid about the belief, with the array of this touch.
   PlannedTouch plan(const DetectedTouch& touch) const;
   Touch view_of(const DetectedTouch& touch) const;
-  /// Adds work for the thread of beliefs.
-  void push(std::function<void()> job);
   /// Runs a thread's work and keeps what it throws.
   void guard(void (LiveRecognition::*work)());
 

@@ -1,4 +1,4 @@
-#include "recognition/placement_judge.hpp"
+#include "recognition/decision.hpp"
 
 #include <algorithm>
 #include <array>

@@ -15,9 +15,7 @@
 #include "palpate/pose_error.hpp"
 #include "recognition/decision.hpp"
 #include "recognition/label_probability.hpp"
-#include "recognition/placement_judge.hpp"
 #include "recognition/scales.hpp"
-#include "recognition/warnings.hpp"
 
 namespace palpate {
 

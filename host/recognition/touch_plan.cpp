@@ -26,75 +26,6 @@ namespace {
 
 constexpr std::array goal_words{"identity", "pose", "both"};  ///< [PlanGoal]
 
-constexpr std::size_t most_places = 75;
-constexpr std::size_t fewest_places = 25;
-constexpr int angles = 4;
-
-/// Where the array's centre touches the object in at least a tenth of the samples.
-class Reach {
- public:
-  Reach(std::span<const PoseSample> samples, const RecognitionTask& task, double half_array_mm)
-      : samples_(samples) {
-    std::vector<BoundingBox> boxes;
-    for (const Hypothesis& hypothesis : task.hypotheses) {
-      boxes.push_back(occupied_box(hypothesis.map));
-      boxes.back().lower -= half_array_mm;
-      boxes.back().upper += half_array_mm;
-    }
-    for (const PoseSample& sample : samples) {
-      const BoundingBox& box = boxes[static_cast<std::size_t>(sample.object)];
-      box_of_.push_back(box);
-      const Pose T_robot_object = inverse(sample.T_object_robot);
-      for (const double x : {box.lower.x, box.upper.x}) {
-        for (const double y : {box.lower.y, box.upper.y}) {
-          around_.take_in(T_robot_object * glm::dvec2(x, y));
-        }
-      }
-    }
-  }
-
-  bool contains(const glm::dvec2& p_robot) const {
-    std::size_t hits = 0;
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      const glm::dvec2 p = samples_[i].T_object_robot * p_robot;
-      const BoundingBox& box = box_of_[i];
-      hits += p.x >= box.lower.x && p.x <= box.upper.x && p.y >= box.lower.y && p.y <= box.upper.y
-                  ? 1
-                  : 0;
-    }
-    return 10 * hits >= samples_.size();
-  }
-
-  /// Places of a square grid about the middle.
-  std::vector<glm::dvec2> places(double step_mm) const {
-    std::vector<glm::dvec2> found;
-    const glm::dvec2 middle = around_.middle();
-    const glm::dvec2 half = around_.extent() / (2.0 * step_mm);
-    const int columns = static_cast<int>(std::floor(half.x));
-    const int rows = static_cast<int>(std::floor(half.y));
-    for (int j = -rows; j <= rows; ++j) {
-      for (int i = -columns; i <= columns; ++i) {
-        const glm::dvec2 place = middle + step_mm * glm::dvec2(i, j);
-        if (contains(place)) {
-          found.push_back(place);
-        }
-      }
-    }
-    return found;
-  }
-
-  /// No step below this makes more places than a grid can be searched for.
-  double least_step_mm() const {
-    constexpr double most_columns = 100.0;
-    return std::max(around_.extent().x, around_.extent().y) / most_columns;
-  }
-
- private:
-  std::span<const PoseSample> samples_;
-  std::vector<BoundingBox> box_of_;  ///< [sample] in the object frame, wider by half an array
-  BoundingBox around_;               ///< all of them, in the robot frame
-};
-
 /// The poses of a file: of a recording's touches, or the rows of a table.
 std::vector<Pose> read_candidates(const std::filesystem::path& path,
                                   const std::function<void(const std::string&)>& tell) {
@@ -179,19 +110,60 @@ std::vector<PlannedTouch> rank_touches(const Recogniser& recogniser, const Recog
 
 std::vector<Pose> candidate_grid(std::span<const PoseSample> samples, const RecognitionTask& task,
                                  std::span<const glm::dvec2> elements_mm, double theta_rad) {
+  constexpr std::size_t most_places = 75;
+  constexpr std::size_t fewest_places = 25;
+  constexpr double most_columns = 100.0;  // no grid of more can be searched
+  constexpr int angles = 4;
   const glm::dvec2 extent = bounding_box(elements_mm).extent();
   const double side_mm = std::min(extent.x, extent.y);
-  const Reach reach(samples, task, side_mm / 2.0);
+  std::vector<BoundingBox> boxes;  // [hypothesis] in the object frame, wider by half an array
+  for (const Hypothesis& hypothesis : task.hypotheses) {
+    boxes.push_back(occupied_box(hypothesis.map));
+    boxes.back().lower -= side_mm / 2.0;
+    boxes.back().upper += side_mm / 2.0;
+  }
+  BoundingBox around;  // all samples' boxes, in the robot frame
+  for (const PoseSample& sample : samples) {
+    const auto& [lower, upper] = boxes[static_cast<std::size_t>(sample.object)];
+    const Pose T_robot_object = inverse(sample.T_object_robot);
+    for (const double x : {lower.x, upper.x}) {
+      for (const double y : {lower.y, upper.y}) {
+        around.take_in(T_robot_object * glm::dvec2(x, y));
+      }
+    }
+  }
+  const auto is_touched = [&](const glm::dvec2& p_robot) {
+    const auto hits = std::ranges::count_if(samples, [&](const PoseSample& sample) {
+      const glm::dvec2 p = sample.T_object_robot * p_robot;
+      const BoundingBox& box = boxes[static_cast<std::size_t>(sample.object)];
+      return p.x >= box.lower.x && p.x <= box.upper.x && p.y >= box.lower.y && p.y <= box.upper.y;
+    });
+    return 10 * static_cast<std::size_t>(hits) >= samples.size();
+  };
+  const auto places_of = [&](double step_mm) {
+    std::vector<glm::dvec2> found;
+    const glm::ivec2 half(around.extent() / (2.0 * step_mm));
+    for (int j = -half.y; j <= half.y; ++j) {
+      for (int i = -half.x; i <= half.x; ++i) {
+        const glm::dvec2 place = around.middle() + step_mm * glm::dvec2(i, j);
+        if (is_touched(place)) {
+          found.push_back(place);
+        }
+      }
+    }
+    return found;
+  };
+  const double least_step_mm = std::max(around.extent().x, around.extent().y) / most_columns;
   // An array of one row has no smaller side.
-  double step_mm = std::max(side_mm / 2.0, reach.least_step_mm());
-  std::vector<glm::dvec2> places = reach.places(step_mm);
-  while (places.size() < fewest_places && 0.8 * step_mm > reach.least_step_mm()) {
+  double step_mm = std::max(side_mm / 2.0, least_step_mm);
+  std::vector<glm::dvec2> places = places_of(step_mm);
+  while (places.size() < fewest_places && 0.8 * step_mm > least_step_mm) {
     step_mm *= 0.8;
-    places = reach.places(step_mm);
+    places = places_of(step_mm);
   }
   while (places.size() > most_places) {
     step_mm *= 1.1;
-    places = reach.places(step_mm);
+    places = places_of(step_mm);
   }
   if (places.empty()) {  // the belief is so wide that no place is touched in a tenth of it
     for (const PoseSample& sample : samples.subspan(0, std::min(samples.size(), most_places))) {

@@ -1,4 +1,4 @@
-#include "recognition/warnings.hpp"
+#include "recognition/decision.hpp"
 
 #include <algorithm>
 #include <array>

@@ -19,8 +19,11 @@ class TriedBins : public testing::Test {
   TriedBins() { letters_.add("A", 20, 71); }
 
   PoseLattice affordable(const PoseLattice& lattice, double minutes, std::size_t maps = 2) const {
-    return affordable_lattice(lattice, letters_.presses, classifier,
-                              {.maps = maps, .spacing_mm = spacing_mm, .minutes = minutes});
+    return affordable_lattice(lattice,
+                              {.presses = letters_.presses,
+                               .readings = {.classifier = classifier, .spacing_mm = spacing_mm},
+                               .maps = {}},
+                              maps, minutes);
   }
 
   LetterPresses letters_;

@@ -1,6 +1,6 @@
 // What is said of touches that one pose of a learned object does not explain.
 
-#include "recognition/placement_judge.hpp"
+#include "recognition/decision.hpp"
 
 #include <cmath>
 #include <memory>

@@ -1,6 +1,6 @@
 // Each warning is provoked on purpose, end to end through recognise(), and good touches give none.
 
-#include "recognition/warnings.hpp"
+#include "recognition/decision.hpp"
 
 #include <cstdio>
 #include <memory>

@@ -1,13 +1,11 @@
-#include <sched.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <string>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
+#include <tbb/info.h>
 #include <CLI/CLI.hpp>
 
 #include "cli/batch/batch_run.hpp"
@@ -16,6 +14,7 @@
 #include "cli/progress.hpp"
 #include "cli/recognition_flags.hpp"
 #include "cli/results_folder.hpp"
+#include "cli/text_table.hpp"
 #include "io/input_file.hpp"
 #include "model/number_text.hpp"
 #include "recognition/batch/batch_task.hpp"
@@ -94,15 +93,6 @@ Shard shard_of(const std::string& flag) {
   return {static_cast<std::size_t>(index), static_cast<std::size_t>(count)};
 }
 
-/// The cores that this process may use: a job's or those of taskset.
-std::size_t cores() {
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  const int count = ::sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 0;
-  return count > 0 ? static_cast<std::size_t>(count)
-                   : std::max(1U, std::thread::hardware_concurrency());
-}
-
 /// The chunks of a shard.
 struct Chunks {
   std::vector<bool> wanted;    ///< [chunk] of the shard and not there yet
@@ -136,14 +126,12 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
 std::string batch_summary(const BatchArguments& options, const Shard& shard, const Chunks& chunks,
                           const BatchCounts& now, double seconds) {
   const std::size_t failed = chunks.finished.failed + now.failed;
-  std::string text = fmt::format("{}: {} unknown{}", options.results, chunks.unknowns,
-                                 chunks.unknowns == 1 ? "" : "s");
+  std::string text =
+      fmt::format("{}: {}", options.results, count_of(chunks.unknowns, "unknown", "unknowns"));
   if (shard.count > 1) {
     text += fmt::format(" of shard {}/{}", shard.index, shard.count);
   }
-  if (chunks.finished.done > 0) {
-    text += fmt::format(", {} done before", chunks.finished.done);
-  }
+  text += also(chunks.finished.done, "done before");
   if (now.done > 0) {
     text += fmt::format(", {} now in {:.1f} s ({:.0f} per second)", now.done, seconds,
                         static_cast<double>(now.done) / seconds);
@@ -166,8 +154,9 @@ void batch(const BatchArguments& options) {
   hash_files(asked, request);
   const ResultsFolder folder(options.results);
   folder.require_own();
-  const std::size_t threads =
-      options.threads > 0 ? static_cast<std::size_t>(options.threads) : cores();
+  // By default the cores that this process may use: a job's or those of taskset.
+  const auto threads = static_cast<std::size_t>(
+      options.threads > 0 ? options.threads : tbb::info::default_concurrency());
   const auto [task, job] = settle_batch(folder, asked, request, threads);
   const Chunks chunks = chunks_of(folder, task, shard);
   const auto begin = std::chrono::steady_clock::now();

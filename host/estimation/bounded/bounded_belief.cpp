@@ -11,7 +11,6 @@
 #include <tbb/info.h>
 
 #include "estimation/bounded/displaced/undisplaced_bins.hpp"
-#include "estimation/bounded/search/bound_search.hpp"
 #include "estimation/hypotheses.hpp"
 
 namespace palpate {

@@ -247,15 +247,9 @@ EvaluatedBelief BoundedPosterior::evaluated_bins() const {
 double BoundedPosterior::log_likelihood(int object, const Pose& T_object_robot) const {
   const BoundedBelief& belief = with_touches_taken_in();
   require_object(object, belief.hypotheses().size());
-  const auto& [translation_mm, theta_rad] = T_object_robot;
-  if (!std::isfinite(translation_mm.x) || !std::isfinite(translation_mm.y) ||
-      !std::isfinite(theta_rad)) {
-    throw Error(Fault::input, fmt::format("pose {}, {}, {}: give finite numbers", translation_mm.x,
-                                          translation_mm.y, theta_rad));
-  }
+  const std::int64_t bin = lattice().bin_of(T_object_robot);  // refuses a pose that is not finite
   const KnownElements& elements = belief.elements();
   if (!belief.options().touch_sd.none()) {
-    const std::int64_t bin = lattice().bin_of(T_object_robot);
     const auto row = static_cast<std::int32_t>(bin / lattice().x_mm.count);
     const BinBox box{.object = object,
                      .theta = row / lattice().y_mm.count,

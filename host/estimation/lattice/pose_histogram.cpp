@@ -95,7 +95,7 @@ struct PoseHistogram::Impl {
 
   void gather(std::span<const TouchEvidence> touches) {
     known = gathered(touches, options.lattice.pivot_mm, likelihood.longest_run(), std::move(known));
-    prior_log_likelihood += palpate::prior_log_likelihood({&known, 1}, options.contact);
+    prior_log_likelihood += palpate::prior_log_likelihood(known, options.contact);
   }
 
   /// The largest bin and the sum of every object; reduced once after each update.

@@ -15,25 +15,6 @@ namespace {
 
 using gpu::Access;
 
-/// The sums of all objects together, by their prior probabilities.
-struct WeightedSum {
-  WeightedSum(std::span<const OverlapSum> sums, std::span<const double> log_weight) {
-    double largest = -std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < sums.size(); ++i) {
-      largest = std::max(largest, log_weight[i] + sums[i].log_sum);
-      bins += std::exp(log_weight[i]) * static_cast<double>(sums[i].bins);
-    }
-    double sum = 0.0;
-    for (std::size_t i = 0; i < sums.size(); ++i) {
-      sum += std::exp(log_weight[i] + sums[i].log_sum - largest);
-    }
-    log_sum = largest + std::log(sum);
-  }
-
-  double log_sum = 0.0;
-  double bins = 0.0;
-};
-
 std::vector<shaders::ObjectBox> boxes_of(std::span<const Hypothesis> hypotheses) {
   std::vector<shaders::ObjectBox> boxes;
   for (const Hypothesis& hypothesis : hypotheses) {
@@ -72,7 +53,6 @@ TouchByTouch::TouchByTouch(gpu::Context& context, gpu::CommandStream& stream,
                            const std::vector<double>& log_weight, DenseBelief& belief)
     : stream_(stream),
       options_(options),
-      log_weight_(log_weight),
       objects_(hypotheses.size()),
       scratch_(belief.uniform()),
       touch_blur_(context, stream, options.lattice, objects_, options.touch_sd, {}),
@@ -91,7 +71,7 @@ TouchByTouch::TouchByTouch(gpu::Context& context, gpu::CommandStream& stream,
     largest_.reserve(objects_);
   }
   if (options.none_weight) {
-    overlap_.emplace(context, stream, scratch_, hypotheses, options.lattice);
+    overlap_.emplace(context, stream, scratch_, hypotheses, log_weight, options.lattice);
   }
   belief.clear();
 }
@@ -142,10 +122,10 @@ void TouchByTouch::slip(DenseBelief& belief) {
 }
 
 void TouchByTouch::add_to_none(const ArrayRectangle& array) {
-  WeightedSum all(overlap_->sums(scratch_, array, false), log_weight_);
+  OverlapSum all = overlap_->sum(scratch_, array, false);
   if (all.bins == 0.0) {
     // No pose of the region brings the array to an object: all poses are alike.
-    all = {overlap_->sums(scratch_, array, true), log_weight_};
+    all = overlap_->sum(scratch_, array, true);
   }
   none_log_evidence_ += all.log_sum - std::log(all.bins);
   if (!felt_) {
@@ -161,10 +141,10 @@ std::uint64_t TouchByTouch::device_bytes() const {
 
 OverlapMean::OverlapMean(gpu::Context& context, gpu::CommandStream& stream,
                          const DenseBelief& belief, std::span<const Hypothesis> hypotheses,
-                         const PoseLattice& lattice)
+                         const std::vector<double>& log_weight, const PoseLattice& lattice)
     : stream_(stream),
+      log_weight_(log_weight),
       lattice_(lattice),
-      objects_(hypotheses.size()),
       kernel_(context, {.name = "sum_overlap",
                         .spirv = shaders::sum_overlap,
                         .bindings = {Access::table, Access::table, Access::table, Access::storage},
@@ -175,19 +155,19 @@ OverlapMean::OverlapMean(gpu::Context& context, gpu::CommandStream& stream,
               gpu::Memory::device, "arrays", VK_FORMAT_R32G32B32A32_SFLOAT),
       boxes_(
           stream.uploaded(boxes_of(hypotheses), "boxes of objects", VK_FORMAT_R32G32B32A32_SFLOAT)),
-      read_partials_(objects_ * static_cast<std::size_t>(lattice.theta_rad.count)),
+      read_partials_(hypotheses.size() * static_cast<std::size_t>(lattice.theta_rad.count)),
       partials_(context, std::span(read_partials_).size_bytes(), gpu::Memory::device,
                 "sums of planes") {
   // The first run, at which drivers compile the kernel.
-  sums(belief, {}, false);
+  sum(belief, {}, false);
 }
 
 std::uint64_t OverlapMean::device_bytes() const {
   return arrays_.bytes() + boxes_.bytes() + partials_.bytes();
 }
 
-std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch,
-                                              const ArrayRectangle& array, bool everywhere) {
+OverlapSum OverlapMean::sum(const DenseBelief& scratch, const ArrayRectangle& array,
+                            bool everywhere) {
   placed_ = arrays_of(array, lattice_, std::move(placed_));
   stream_.upload(arrays_, placed_);
   // Half a float's largest: sums of two stay finite.
@@ -210,32 +190,39 @@ std::span<const OverlapSum> OverlapMean::sums(const DenseBelief& scratch,
   stream_.download(partials_, read_partials_);
   stream_.run();
 
-  largest_.assign(objects_, -std::numeric_limits<double>::infinity());
-  sum_.assign(objects_, 0.0);
-  sums_.assign(objects_, {});
+  of_objects_.assign(log_weight_.size(), {});
   const auto for_each_partial = [&](const auto& take) {
     const shaders::OverlapPartial* partial = read_partials_.data();
     for (const Slab& slab : scratch.slabs()) {
       for (std::uint32_t i = 0; i < slab.object_count; ++i) {
         for (std::uint32_t t = 0; t < slab.theta_count; ++t, ++partial) {
           if (partial->bins > 0) {
-            take(slab.object_first + i, *partial);
+            take(of_objects_[slab.object_first + i], *partial);
           }
         }
       }
     }
   };
-  for_each_partial([&](std::size_t object, const shaders::OverlapPartial& partial) {
-    largest_[object] = std::max<double>(largest_[object], partial.max);
+  for_each_partial([](ObjectSum& of, const shaders::OverlapPartial& partial) {
+    of.largest = std::max<double>(of.largest, partial.max);
   });
-  for_each_partial([&](std::size_t object, const shaders::OverlapPartial& partial) {
-    sum_[object] += partial.sum * std::exp(partial.max - largest_[object]);
-    sums_[object].bins += partial.bins;
+  for_each_partial([](ObjectSum& of, const shaders::OverlapPartial& partial) {
+    of.sum += partial.sum * std::exp(partial.max - of.largest);
+    of.bins += partial.bins;
   });
-  for (std::size_t i = 0; i < objects_; ++i) {
-    sums_[i].log_sum = largest_[i] + std::log(sum_[i]);
+  OverlapSum all{.log_sum = -std::numeric_limits<double>::infinity()};
+  for (std::size_t i = 0; i < of_objects_.size(); ++i) {
+    ObjectSum& of = of_objects_[i];
+    of.log_sum = log_weight_[i] + (of.largest + std::log(of.sum));
+    all.log_sum = std::max(all.log_sum, of.log_sum);
+    all.bins += std::exp(log_weight_[i]) * static_cast<double>(of.bins);
   }
-  return sums_;
+  double sum = 0.0;
+  for (const ObjectSum& of : of_objects_) {
+    sum += std::exp(of.log_sum - all.log_sum);
+  }
+  all.log_sum += std::log(sum);
+  return all;
 }
 
 }  // namespace palpate

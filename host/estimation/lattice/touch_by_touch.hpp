@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -19,33 +20,39 @@
 
 namespace palpate {
 
-/// A touch's likelihood summed over some bins of an object.
+/// A touch's likelihood summed over some bins of all objects, by the objects' prior probabilities.
 struct OverlapSum {
-  double log_sum = 0.0;  ///< in nats; -infinity where there is no such bin
-  std::int64_t bins = 0;
+  double log_sum = 0.0;  ///< in nats; no number where there is no such bin
+  double bins = 0.0;     ///< so many, on average
 };
 
-/// Sums a touch's likelihood, as if it lay where the robot says, object by object, over the bins at
-/// which the array overlaps the object: at which the rectangle around its elements, parallel to the
-/// sensor's axes, meets the box around the map's cells with log odds above 0.
+/// Sums a touch's likelihood, as if it lay where the robot says, over the bins at which the array
+/// overlaps the object: at which the rectangle around its elements, parallel to the sensor's axes,
+/// meets the box around the map's cells with log odds above 0.
 class OverlapMean {
  public:
   OverlapMean(gpu::Context& context, gpu::CommandStream& stream, const DenseBelief& belief,
-              std::span<const Hypothesis> hypotheses, const PoseLattice& lattice);
+              std::span<const Hypothesis> hypotheses, const std::vector<double>& log_weight,
+              const PoseLattice& lattice);
 
   std::uint64_t device_bytes() const;
 
   /// Runs the stream.
   /// @param scratch with a touch's log-likelihood in the high words
   /// @param everywhere whether all bins count, wherever the array is
-  /// @returns [object], until the next call
-  std::span<const OverlapSum> sums(const DenseBelief& scratch, const ArrayRectangle& array,
-                                   bool everywhere);
+  OverlapSum sum(const DenseBelief& scratch, const ArrayRectangle& array, bool everywhere);
 
  private:
+  struct ObjectSum {
+    double largest = -std::numeric_limits<double>::infinity();
+    double sum = 0.0;      ///< relative to the largest
+    double log_sum = 0.0;  ///< with the prior probability
+    std::int64_t bins = 0;
+  };
+
   gpu::CommandStream& stream_;
+  const std::vector<double>& log_weight_;  ///< [object]
   PoseLattice lattice_;
-  std::size_t objects_;
   gpu::Kernel kernel_;
   gpu::Buffer arrays_;
   gpu::Buffer boxes_;
@@ -53,9 +60,7 @@ class OverlapMean {
   gpu::Buffer partials_;
   // Memory that calls share.
   std::vector<shaders::ArrayAtTheta> placed_;
-  std::vector<double> largest_;
-  std::vector<double> sum_;
-  std::vector<OverlapSum> sums_;
+  std::vector<ObjectSum> of_objects_;
 };
 
 /// The update of a belief where each touch's likelihood is wanted by itself before it joins the
@@ -94,7 +99,6 @@ class TouchByTouch {
 
   gpu::CommandStream& stream_;
   const HistogramOptions& options_;
-  const std::vector<double>& log_weight_;
   std::size_t objects_;
   DenseBelief scratch_;
   DisplacementBlur touch_blur_;

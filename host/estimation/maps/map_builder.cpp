@@ -157,15 +157,97 @@ struct MapBuilder::Impl {
     return support_radius_mm(options.sensor, all.readings);
   }
   /// Throws Error where the device cannot hold these cells.
-  void require_room(const CellRange& needed) const;
+  void require_room(const CellRange& needed) const {
+    const gpu::Limits& limits = context.limits();
+    if (bytes_of(needed) > std::min({limits.storage_range, limits.allocation, limits.memory})) {
+      throw Error(
+          Fault::input,
+          fmt::format("the map would have {} x {} cells of {} mm, more than device '{}' binds "
+                      "at once; use larger cells, or touches that lie closer together",
+                      needed.nx, needed.ny, options.cell_mm, context.name()));
+    }
+  }
   /// Returns the cells of a map of all these readings. Throws Error where they are too many.
-  CellRange range_of(const Seen& all) const;
-  void grow(const CellRange& needed);
+  CellRange range_of(const Seen& all) const {
+    const CellRange needed = cover(all.box.lower, all.box.upper, radius_mm(all), options.cell_mm);
+    require_room(needed);
+    return needed;
+  }
+  void grow(const CellRange& needed) {
+    if (range.contains(needed)) {
+      return;
+    }
+    const CellRange larger = united(range, needed);
+    require_room(larger);
+    gpu::Buffer grown(context, bytes_of(larger), gpu::Memory::device, "map cells");
+    std::vector<TwoFloat> old(static_cast<std::size_t>(range.nx * range.ny));
+    if (!old.empty()) {
+      stream.download(cells, old);
+      stream.run();
+    }
+    stream.fill(grown, 0);
+    const auto width = static_cast<std::size_t>(range.nx);
+    for (std::int64_t y = range.y; y < range.y + range.ny; ++y) {
+      stream.upload(grown, std::span(old).subspan(range.index(range.x, y), width),
+                    larger.index(range.x, y) * sizeof(TwoFloat));
+    }
+    stream.run();
+    cells = std::move(grown);
+    range = larger;
+  }
   /// Adds each pending reading to the cells within radius_mm() of it and to some beyond, in passes
   /// of bounded device memory.
-  void flush();
+  void flush() {
+    // Once for all passes: to grow copies all cells, and a sensor that moves would grow with each.
+    grow(range_of(seen));
+    const double radius = radius_mm(seen);
+    const double cell_mm = options.cell_mm;
+    const double tiles_across = 2.0 + 2.0 * radius / (cell_mm * shaders::TILE_CELLS);
+    const double most_entries = std::min(static_cast<double>(entries_per_pass),
+                                         static_cast<double>(context.limits().table_texels));
+    // All readings of a pass may lie on one tile.
+    const auto pass =
+        static_cast<std::size_t>(std::clamp(most_entries / (tiles_across * tiles_across), 1.0,
+                                            static_cast<double>(gpu::most_iterations)));
+    for (std::span<const ElementReading> readings = pending; !readings.empty();
+         readings = readings.subspan(std::min(pass, readings.size()))) {
+      const auto part = readings.first(std::min(pass, readings.size()));
+      const TileLists lists = assign_to_tiles(part, range, cell_mm, radius, options.sensor);
+      if (lists.tiles.empty()) {
+        continue;  // every reading falls between the centres of cells larger than its support
+      }
+      const gpu::Buffer tiles = stream.uploaded(lists.tiles, "map tiles");
+      const gpu::Buffer list =
+          stream.uploaded(lists.readings, "readings per map tile", VK_FORMAT_R32G32B32A32_SFLOAT);
+      const std::size_t limit = context.limits().group_count[0];
+      for (std::size_t tile = 0; tile < lists.tiles.size(); tile += limit) {
+        const shaders::EvidencePush push{.tile_first = static_cast<shaders::uint>(tile),
+                                         .width = static_cast<shaders::uint>(range.nx),
+                                         .height = static_cast<shaders::uint>(range.ny),
+                                         .cell_mm = static_cast<float>(cell_mm)};
+        const auto groups = static_cast<std::uint32_t>(std::min(limit, lists.tiles.size() - tile));
+        stream.dispatch(kernel, {&tiles, &list, &cells}, push, {groups, 1, 1});
+      }
+      stream.run();
+    }
+    pending.clear();
+  }
   /// Returns the sums over these cells, in row-major order; 0 where nothing was added.
-  std::vector<double> sums(const CellRange& of);
+  std::vector<double> sums(const CellRange& of) {
+    std::vector<TwoFloat> read(static_cast<std::size_t>(range.nx * range.ny));
+    if (!read.empty()) {
+      stream.download(cells, read);
+      stream.run();
+    }
+    std::vector<double> sums(static_cast<std::size_t>(of.nx * of.ny), 0.0);
+    const CellRange summed = common(of, range);
+    for (std::int64_t y = summed.y; y < summed.y + summed.ny; ++y) {
+      for (std::int64_t x = summed.x; x < summed.x + summed.nx; ++x) {
+        sums[of.index(x, y)] = read[range.index(x, y)].value();
+      }
+    }
+    return sums;
+  }
 
   MapOptions options;
   gpu::Context& context;
@@ -178,98 +260,6 @@ struct MapBuilder::Impl {
   ChangeInSteps change{"map: adding touches failed half-way; clear() the builder"};
   OwnProcess process;
 };
-
-void MapBuilder::Impl::require_room(const CellRange& needed) const {
-  const gpu::Limits& limits = context.limits();
-  if (bytes_of(needed) > std::min({limits.storage_range, limits.allocation, limits.memory})) {
-    throw Error(
-        Fault::input,
-        fmt::format("the map would have {} x {} cells of {} mm, more than device '{}' binds "
-                    "at once; use larger cells, or touches that lie closer together",
-                    needed.nx, needed.ny, options.cell_mm, context.name()));
-  }
-}
-
-CellRange MapBuilder::Impl::range_of(const Seen& all) const {
-  const CellRange needed = cover(all.box.lower, all.box.upper, radius_mm(all), options.cell_mm);
-  require_room(needed);
-  return needed;
-}
-
-void MapBuilder::Impl::grow(const CellRange& needed) {
-  if (range.contains(needed)) {
-    return;
-  }
-  const CellRange larger = united(range, needed);
-  require_room(larger);
-  gpu::Buffer grown(context, bytes_of(larger), gpu::Memory::device, "map cells");
-  std::vector<TwoFloat> old(static_cast<std::size_t>(range.nx * range.ny));
-  if (!old.empty()) {
-    stream.download(cells, old);
-    stream.run();
-  }
-  stream.fill(grown, 0);
-  const auto width = static_cast<std::size_t>(range.nx);
-  for (std::int64_t y = range.y; y < range.y + range.ny; ++y) {
-    stream.upload(grown, std::span(old).subspan(range.index(range.x, y), width),
-                  larger.index(range.x, y) * sizeof(TwoFloat));
-  }
-  stream.run();
-  cells = std::move(grown);
-  range = larger;
-}
-
-void MapBuilder::Impl::flush() {
-  // Once for all passes: to grow copies all cells, and a sensor that moves would grow with each.
-  grow(range_of(seen));
-  const double radius = radius_mm(seen);
-  const double cell_mm = options.cell_mm;
-  const double tiles_across = 2.0 + 2.0 * radius / (cell_mm * shaders::TILE_CELLS);
-  const double most_entries = std::min(static_cast<double>(entries_per_pass),
-                                       static_cast<double>(context.limits().table_texels));
-  // All readings of a pass may lie on one tile.
-  const auto pass =
-      static_cast<std::size_t>(std::clamp(most_entries / (tiles_across * tiles_across), 1.0,
-                                          static_cast<double>(gpu::most_iterations)));
-  for (std::span<const ElementReading> readings = pending; !readings.empty();
-       readings = readings.subspan(std::min(pass, readings.size()))) {
-    const auto part = readings.first(std::min(pass, readings.size()));
-    const TileLists lists = assign_to_tiles(part, range, cell_mm, radius, options.sensor);
-    if (lists.tiles.empty()) {
-      continue;  // every reading falls between the centres of cells larger than its support
-    }
-    const gpu::Buffer tiles = stream.uploaded(lists.tiles, "map tiles");
-    const gpu::Buffer list =
-        stream.uploaded(lists.readings, "readings per map tile", VK_FORMAT_R32G32B32A32_SFLOAT);
-    const std::size_t limit = context.limits().group_count[0];
-    for (std::size_t tile = 0; tile < lists.tiles.size(); tile += limit) {
-      const shaders::EvidencePush push{.tile_first = static_cast<shaders::uint>(tile),
-                                       .width = static_cast<shaders::uint>(range.nx),
-                                       .height = static_cast<shaders::uint>(range.ny),
-                                       .cell_mm = static_cast<float>(cell_mm)};
-      const auto groups = static_cast<std::uint32_t>(std::min(limit, lists.tiles.size() - tile));
-      stream.dispatch(kernel, {&tiles, &list, &cells}, push, {groups, 1, 1});
-    }
-    stream.run();
-  }
-  pending.clear();
-}
-
-std::vector<double> MapBuilder::Impl::sums(const CellRange& of) {
-  std::vector<TwoFloat> read(static_cast<std::size_t>(range.nx * range.ny));
-  if (!read.empty()) {
-    stream.download(cells, read);
-    stream.run();
-  }
-  std::vector<double> sums(static_cast<std::size_t>(of.nx * of.ny), 0.0);
-  const CellRange summed = common(of, range);
-  for (std::int64_t y = summed.y; y < summed.y + summed.ny; ++y) {
-    for (std::int64_t x = summed.x; x < summed.x + summed.nx; ++x) {
-      sums[of.index(x, y)] = read[range.index(x, y)].value();
-    }
-  }
-  return sums;
-}
 
 MapBuilder::MapBuilder(Device& device, const MapOptions& options) {
   options.validate();

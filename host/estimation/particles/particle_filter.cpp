@@ -184,7 +184,7 @@ struct ParticleFilter::Impl {
     sum_weights();
     weighed = true;
     // The largest weight is the touch's log-likelihood by the particle that explains it best.
-    prior_over_best += prior_log_likelihood({&known, 1}, options.contact) - summary.log_largest;
+    prior_over_best += prior_log_likelihood(known, options.contact) - summary.log_largest;
     averages.add(summary.log_largest + std::log(summary.sum / static_cast<double>(size())),
                  known.from_pivot_mm.size());
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <compare>
 #include <functional>
 #include <numbers>
 #include <vector>
@@ -30,33 +31,18 @@ static_assert(unit_particles < gpu::most_iterations / 2);
 constexpr std::size_t units_per_run = 1 << 14;
 constexpr std::size_t first_tiles = 16;
 
-/// Object, sector of theta, y, x: whole numbers in one that sorts in this order. y and x may be
-/// negative; where they do not fit, they are clamped, at 65 m from the region's centre.
+/// A cell of the grid, or a tile of cells; they are sorted in this order.
 struct Key {
-  static constexpr int bits = 18;
-  static constexpr int bias = 1 << (bits - 1);
+  std::uint32_t object = 0;
+  int sector = 0;  ///< of theta
+  int y = 0;
+  int x = 0;
 
-  static std::uint64_t pack(std::uint64_t object, int sector, int y, int x) {
-    const auto biased = [](int v) {
-      return static_cast<std::uint64_t>(std::clamp(v, -bias, bias - 1) + bias);
-    };
-    return (((object * 8 + static_cast<std::uint64_t>(sector)) << bits | biased(y)) << bits) |
-           biased(x);
-  }
-  explicit Key(std::uint64_t key)
-      : object(static_cast<std::uint32_t>(key >> (2 * bits + 3))),
-        sector(static_cast<int>(key >> (2 * bits) & 7)),
-        y(static_cast<int>(key >> bits & (2 * bias - 1)) - bias),
-        x(static_cast<int>(key & (2 * bias - 1)) - bias) {}
-
-  std::uint32_t object;
-  int sector;
-  int y;
-  int x;
+  friend auto operator<=>(const Key&, const Key&) = default;
 };
 
 int cell_of(float mm) {
-  constexpr double far = Key::bias;
+  constexpr double far = 1 << 28;
   return static_cast<int>(std::floor(std::clamp(mm / step_mm, -far, far)));
 }
 
@@ -71,7 +57,7 @@ using Range = std::array<std::uint32_t, 2>;
 
 /// The particles that count, in the order of their cells.
 struct SortedParticles {
-  std::vector<std::uint64_t> key;   ///< by cell
+  std::vector<Key> cell;
   std::vector<glm::vec4> particle;  ///< x_mm, y_mm, theta_rad, weight over the largest
   std::vector<double> mass_before;  ///< sum of the weights of all before, and of all
   double largest = 0.0;             ///< weight
@@ -85,19 +71,19 @@ SortedParticles sort(std::span<const shaders::Particle> particles,
   sorted.largest = *std::max_element(weights.begin(), weights.end());
   // All that are left out together change the maximum, at least half the largest weight, by 1e-9.
   const double least = sorted.largest * 1e-10 / static_cast<double>(particles.size());
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+  std::vector<std::pair<Key, std::uint32_t>> order;
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const auto& [object, x_mm, y_mm, theta_rad] = particles[i];
     if (weights[i] > least) {
-      order.emplace_back(Key::pack(object, sector_of(theta_rad), cell_of(y_mm), cell_of(x_mm)),
-                         static_cast<std::uint32_t>(i));
+      order.push_back({{object, sector_of(theta_rad), cell_of(y_mm), cell_of(x_mm)},
+                       static_cast<std::uint32_t>(i)});
     }
   }
-  std::sort(order.begin(), order.end());
+  std::ranges::stable_sort(order, {}, [](const auto& of) { return of.first; });
   double mass = 0.0;
-  for (const auto& [key, i] : order) {
+  for (const auto& [cell, i] : order) {
     const double weight = weights[i] / sorted.largest;
-    sorted.key.push_back(key);
+    sorted.cell.push_back(cell);
     sorted.particle.emplace_back(particles[i].x_mm, particles[i].y_mm, particles[i].theta_rad,
                                  static_cast<float>(weight));
     sorted.mass_before.push_back(mass);
@@ -109,34 +95,32 @@ SortedParticles sort(std::span<const shaders::Particle> particles,
 
 /// A tile of grid points, edge x edge in x and y and a sector of theta.
 struct Tile {
-  std::uint64_t key = 0;      ///< in tiles
+  Key key;
   std::vector<Range> ranges;  ///< of the particles that may reach it
   double mass = 0.0;          ///< of those, which bounds the density
 };
 
 /// All tiles that a particle reaches and some of their neighbours.
-std::vector<std::uint64_t> reached_tiles(const SortedParticles& sorted) {
-  std::vector<std::uint64_t> occupied;
-  for (const std::uint64_t cell : sorted.key) {
-    const Key key(cell);
-    const std::uint64_t tile = Key::pack(key.object, key.sector, tile_of(key.y), tile_of(key.x));
+std::vector<Key> reached_tiles(const SortedParticles& sorted) {
+  std::vector<Key> occupied;
+  for (const Key& cell : sorted.cell) {
+    const Key tile{cell.object, cell.sector, tile_of(cell.y), tile_of(cell.x)};
     if (occupied.empty() || occupied.back() != tile) {
       occupied.push_back(tile);
     }
   }
-  const auto make_unique = [](std::vector<std::uint64_t>& keys) {
+  const auto make_unique = [](std::vector<Key>& keys) {
     std::ranges::sort(keys);
     keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   };
   make_unique(occupied);
-  std::vector<std::uint64_t> reached;
-  for (const std::uint64_t tile : occupied) {
-    const Key key(tile);
+  std::vector<Key> reached;
+  for (const Key& tile : occupied) {
     for (const int turn : {sectors - 1, 0, 1}) {
       for (const int dy : {-1, 0, 1}) {
         for (const int dx : {-1, 0, 1}) {
           reached.push_back(
-              Key::pack(key.object, (key.sector + turn) % sectors, key.y + dy, key.x + dx));
+              {tile.object, (tile.sector + turn) % sectors, tile.y + dy, tile.x + dx});
         }
       }
     }
@@ -145,19 +129,18 @@ std::vector<std::uint64_t> reached_tiles(const SortedParticles& sorted) {
   return reached;
 }
 
-Tile gather(const SortedParticles& sorted, std::uint64_t tile_key) {
-  const auto first_of = [&sorted](std::uint64_t key) {
-    return static_cast<std::uint32_t>(std::lower_bound(sorted.key.begin(), sorted.key.end(), key) -
-                                      sorted.key.begin());
+Tile gather(const SortedParticles& sorted, const Key& key) {
+  const auto first_of = [&sorted](const Key& cell) {
+    return static_cast<std::uint32_t>(std::ranges::lower_bound(sorted.cell, cell) -
+                                      sorted.cell.begin());
   };
-  Tile tile{.key = tile_key, .ranges = {}};
-  const Key key(tile_key);
+  Tile tile{.key = key, .ranges = {}};
   for (const int turn : {sectors - 1, 0, 1}) {
     const int sector = (key.sector + turn) % sectors;
     for (int y = key.y * edge - reach_cells; y < key.y * edge + edge - 1 + reach_cells; ++y) {
       const int x = key.x * edge;
-      const Range range{first_of(Key::pack(key.object, sector, y, x - reach_cells)),
-                        first_of(Key::pack(key.object, sector, y, x + edge - 1 + reach_cells))};
+      const Range range{first_of({key.object, sector, y, x - reach_cells}),
+                        first_of({key.object, sector, y, x + edge - 1 + reach_cells})};
       if (range[0] < range[1]) {
         tile.ranges.push_back(range);
         tile.mass += sorted.mass(range);
@@ -170,7 +153,7 @@ Tile gather(const SortedParticles& sorted, std::uint64_t tile_key) {
 /// The tiles that a particle reaches, the heaviest first.
 std::vector<Tile> tiles_of(const SortedParticles& sorted) {
   std::vector<Tile> tiles;
-  for (const std::uint64_t key : reached_tiles(sorted)) {
+  for (const Key& key : reached_tiles(sorted)) {
     if (Tile tile = gather(sorted, key); !tile.ranges.empty()) {
       tiles.push_back(std::move(tile));
     }
@@ -187,7 +170,7 @@ struct Batch {
 
   /// Cuts the tile's ranges into units.
   void add(const Tile& tile) {
-    const Key key(tile.key);
+    const Key& key = tile.key;
     std::uint32_t room = 0;
     for (const Range& range : tile.ranges) {
       for (std::uint32_t begin = range[0]; begin < range[1];) {
@@ -301,7 +284,7 @@ ParzenMaximum ParzenMode::find(std::span<const shaders::Particle> particles,
   }
 
   const Tile& tile = tiles[best.tile];
-  const Key key(tile.key);
+  const Key& key = tile.key;
   const int turn = key.sector * shaders::PARZEN_THETAS + best.point / (edge * edge);
   ParzenMaximum maximum{.object = key.object,
                         .x_mm = step_mm * (key.x * edge + best.point % edge),

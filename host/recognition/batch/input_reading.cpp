@@ -109,21 +109,17 @@ ReadInput read_input(const BatchEntry& input, const Request& request,
 }
 
 InputSurvey survey_of(const BatchEntry& entry, const Request& request) {
-  try {
+  InputSurvey survey;
+  input_fault_of([&] {
     const ReadInput read = read_input(entry, request, nullptr);
-    InputSurvey survey{.touches = 0,
-                       .reach_mm = largest_reach_mm(std::span(read.recording.get(), 1)),
-                       .pressure_unit = read.recording->pressure_unit};
+    survey = {.touches = 0,
+              .reach_mm = largest_reach_mm(std::span(read.recording.get(), 1)),
+              .pressure_unit = read.recording->pressure_unit};
     for (const Query& unknown : read.unknowns) {
       survey.touches += unknown.touches.size();
     }
-    return survey;
-  } catch (const Error& error) {
-    if (error.fault() != Fault::input) {
-      throw;
-    }
-    return {};
-  }
+  });
+  return survey;
 }
 
 constexpr const char* begin_again = "begin again, in another folder";
@@ -178,16 +174,11 @@ ReadInput read_entry(const BatchTask& task, const BatchEntry& entry, const Reque
   };
   require_unchanged();
   ReadInput read;
-  try {
-    read = read_input(entry, request, &task.inferred);
-  } catch (const Error& error) {
-    require_unchanged();
-    if (error.fault() != Fault::input) {
-      throw;
-    }
-    return broken_input(entry, count, request, error.what());
-  }
+  const auto fault = input_fault_of([&] { read = read_input(entry, request, &task.inferred); });
   require_unchanged();
+  if (fault) {
+    return broken_input(entry, count, request, *fault);
+  }
   if (read.unknowns.size() != count) {
     refuse(entry.path, "has {} unknowns, but had {} when the batch began; {}", read.unknowns.size(),
            count, begin_again);

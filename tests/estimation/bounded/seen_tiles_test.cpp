@@ -13,7 +13,6 @@
 
 #include "bound_cases.hpp"
 #include "estimation/bounded/leaves/bin_likelihood.hpp"
-#include "estimation/bounded/search/bound_search.hpp"
 #include "support/limits.hpp"
 #include "support/trials.hpp"
 

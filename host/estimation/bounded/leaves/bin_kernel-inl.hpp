@@ -311,11 +311,11 @@ template <class D>
 class TableRow {
  public:
   TableRow(D d, const ReadingForm& form, std::size_t object, Reading reading)
-      : values_(form.values(object, reading)),
-        first_(hn::Set(d, form.first_log_odds)),
+      : values_(numbers_of(form.table, reading, object).data()),
+        first_(hn::Set(d, form.table.first_log_odds)),
         scale_(hn::Set(d, form.nodes_per_nat)),
-        last_(hn::Set(d, static_cast<double>(form.nodes - 1))),
-        last_segment_(hn::Set(d, static_cast<double>(form.nodes - 2))) {}
+        last_(hn::Set(d, static_cast<double>(form.table.nodes - 1))),
+        last_segment_(hn::Set(d, static_cast<double>(form.table.nodes - 2))) {}
 
   HWY_INLINE hn::Vec<D> at(D d, hn::Vec<D> l) const {
     const auto at = hn::Max(hn::Zero(d), hn::Min(hn::Mul(hn::Sub(l, first_), scale_), last_));

@@ -214,14 +214,9 @@ MapPatches::MapPatches(const OccupancyGrid& map, double prior)
 
 ReadingForm::ReadingForm(const ContactModel& contact) {
   if (contact.table) {
-    const LikelihoodTable& from = *contact.table;
     kind = Kind::table;
-    nodes = from.nodes;
-    readings = from.levels();
-    sets = from.sets();
-    first_log_odds = from.first_log_odds;
-    nodes_per_nat = static_cast<double>(nodes - 1) / (from.last_log_odds - from.first_log_odds);
-    rows = from.log_likelihood;
+    table = *contact.table;
+    nodes_per_nat = palpate::nodes_per_nat(table);
     return;
   }
   const double floor = contact.gamma * contact.prior.value();

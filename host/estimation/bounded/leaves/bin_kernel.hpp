@@ -59,25 +59,14 @@ struct ReadingForm {
   /// @param contact resolved: with its prior
   explicit ReadingForm(const ContactModel& contact);
 
-  /// A table's values of an object's reading, [node].
-  const double* values(std::size_t object, Reading reading) const {
-    const std::size_t row = (sets == 1 ? 0 : object) * readings + static_cast<std::size_t>(reading);
-    return rows.data() + row * nodes;
-  }
-
   Kind kind = Kind::products;
   double ratio = 0.0;      ///< r
   double log_ratio = 0.0;  ///< log r, finite also for r = 0
   double log_scale = 0.0;  ///< log s
   int interval = 1;
 
-  // What a table has beside.
-  double first_log_odds = 0.0;
-  double nodes_per_nat = 0.0;
-  std::size_t nodes = 0;
-  std::size_t readings = 0;
-  std::size_t sets = 0;
-  std::vector<double> rows;  ///< [set, reading, node]
+  LikelihoodTable table;       ///< where it is the kind
+  double nodes_per_nat = 0.0;  ///< of the table
 };
 
 /// Most lanes of a vector. Lists that kernels read are padded to a multiple of it.

@@ -46,14 +46,6 @@ struct AxisRun {
   }
 };
 
-/// Bins along an axis for each of the fewest equal parts that fit a block.
-int bins_per_part(int count, double step_cells) {
-  const double fit = step_cells > 0.0 ? std::floor(most_block_cells / step_cells) + 1.0 : 1e9;
-  const int limit = static_cast<int>(std::min<double>(most_block_bins, fit));
-  const int parts = (count + limit - 1) / limit;
-  return (count + parts - 1) / parts;
-}
-
 constexpr int side = BlockRun::side;
 
 /// The blocks of 4 x 4 bins that boxes of one object lie in, and sums for all of their bins.
@@ -158,14 +150,11 @@ void BinLikelihood::evaluate_on_this_thread(std::span<const BinBox> boxes,
                      map.reach_cells, map.grid, placed);
     }
     of = &box;
-    const int width = bins_per_part(box.x_count, lattice_.x_mm.step() / map.cell_mm);
-    const int height = bins_per_part(box.y_count, lattice_.y_mm.step() / map.cell_mm);
     for (int j = 0; j < box.y_count;) {
-      const AxisRun rows(lattice_.y_mm, box.y_first + j, std::min(height, box.y_count - j),
-                         map.origin_mm.y, map);
+      const AxisRun rows(lattice_.y_mm, box.y_first + j, box.y_count - j, map.origin_mm.y, map);
       for (int i = 0; i < box.x_count;) {
-        const AxisRun columns(lattice_.x_mm, box.x_first + i, std::min(width, box.x_count - i),
-                              map.origin_mm.x, map);
+        const AxisRun columns(lattice_.x_mm, box.x_first + i, box.x_count - i, map.origin_mm.x,
+                              map);
         for (int r = 0; r < rows.count; ++r) {
           for (int c = 0; c < columns.count; ++c) {
             bins.x_offset.push_back(columns.offset[c]);
@@ -281,7 +270,7 @@ void BinLikelihood::evaluate_displaced(std::span<const BinBox> boxes, const Know
 }
 
 std::uint64_t BinLikelihood::bytes() const {
-  std::uint64_t sum = form_.rows.capacity() * sizeof(double);
+  std::uint64_t sum = form_.table.log_likelihood.capacity() * sizeof(double);
   for (const PlacedMap& map : maps_) {
     sum += map.nodes.bytes();
   }
@@ -341,17 +330,17 @@ double BinLikelihood::undisplaced_error(std::size_t object, const KnownElements&
     // scale. Then the table's numbers, a product and a sum, and the sum over elements.
     double largest = 0.0;   // magnitude, in nats
     double steepest = 0.0;  // difference per nat of log odds
-    for (std::size_t reading = 0; reading < form_.readings; ++reading) {
-      const std::span of(form_.values(object, static_cast<Reading>(reading)), form_.nodes);
+    for (std::size_t reading = 0; reading < form_.table.levels(); ++reading) {
+      const std::span of = numbers_of(form_.table, static_cast<Reading>(reading), object);
       for (std::size_t i = 0; i < of.size(); ++i) {
         const double next = of[std::min(i + 1, of.size() - 1)];
         largest = std::max(largest, std::abs(of[i]));
         steepest = std::max(steepest, std::abs(next - of[i]) * form_.nodes_per_nat);
       }
     }
-    const double width = static_cast<double>(form_.nodes - 1) / form_.nodes_per_nat;
+    const double width = static_cast<double>(form_.table.nodes - 1) / form_.nodes_per_nat;
     const double argument =
-        log_odds + u * (map.largest + 2.0 * std::abs(form_.first_log_odds) + 4.0 * width);
+        log_odds + u * (map.largest + 2.0 * std::abs(form_.table.first_log_odds) + 4.0 * width);
     const double each =
         std::min(steepest * argument, 2.0 * largest) + (8.0 * u + u * count) * largest;
     return second_order * count * each;

@@ -1,5 +1,3 @@
-#include "estimation/bounded/search/bound_search.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -7,6 +5,7 @@
 
 #include "estimation/bounded/search/leaves.hpp"
 #include "estimation/bounded/search/mass_account.hpp"
+#include "estimation/bounded/search/search_space.hpp"
 #include "estimation/bounded/search/tile_division.hpp"
 
 namespace palpate {
@@ -84,7 +83,7 @@ class SearchRun {
   /// @param best the largest tile of the largest bound of every object and theta
   bool contradicted(const std::vector<Tile>& best) {
     const double least =
-        prior_log_likelihood({&task_.elements, 1}, task_.options.contact) - contradiction_nats;
+        prior_log_likelihood(task_.elements, task_.options.contact) - contradiction_nats;
     const std::size_t objects = space_.bounds.size();
     const auto explains = [&](std::size_t i) { return account_.best_of(i) >= least; };
     for (std::size_t i = 0; i < objects; ++i) {

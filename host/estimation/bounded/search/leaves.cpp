@@ -45,7 +45,7 @@ Leaves::Leaves(const SearchTask& task, MassAccount& account)
     : task_(task),
       account_(account),
       displaced_(task.space.displacement.has_value()),
-      poor_below_(poor_share * prior_log_likelihood({&task.elements, 1}, task.options.contact)) {}
+      poor_below_(poor_share * prior_log_likelihood(task.elements, task.options.contact)) {}
 
 std::vector<BinBox> Leaves::boxes_of(std::span<const Tile> tiles) const {
   std::vector<BinBox> boxes;

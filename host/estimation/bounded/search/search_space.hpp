@@ -149,6 +149,7 @@ std::vector<std::vector<double>> unpenalised(const SearchSpace& space,
                                              const KnownElements& elements);
 
 class BinLikelihood;
+class LargestTiles;
 
 /// What all parts of one search are given; it outlives them.
 struct SearchTask {
@@ -161,5 +162,17 @@ struct SearchTask {
   const BinVisitor& visit;
   std::vector<double> error = {};  ///< [hypothesis] BinLikelihood::error() of the elements
 };
+
+/// Finds the bins that hold all but a tolerated part of the posterior, by branch and bound: tiles
+/// of poses are bounded by TileBounds, dropped where they hold too little, and divided otherwise,
+/// until the smallest tiles' bins are evaluated in the order of their bounds. docs/bounds_inside.md
+/// has the bound, its proof and the certificate.
+/// @param largest has taken in the task's elements
+/// @param refined where not null, takes the tiles that are divided
+SearchResult run_search(SearchTask task, const LargestTiles& largest,
+                        std::vector<PoseBlock>* refined = nullptr);
+
+/// The bins of a tile of this level.
+PoseBlock block_of(const BinBox& box, std::size_t level);
 
 }  // namespace palpate

@@ -27,17 +27,12 @@ double largest_in(const Extremes& range, const ContactModel& contact, Reading re
     return at(reading == Reading::no_contact ? range.least : range.most);
   }
   const LikelihoodTable& table = *contact.table;
-  const std::size_t set = table.sets() == 1 ? 0 : object;
-  const std::span<const double> nodes =
-      std::span(table.log_likelihood)
-          .subspan((set * table.levels() + static_cast<std::size_t>(reading)) * table.nodes,
-                   table.nodes);
+  const std::span<const double> nodes = numbers_of(table, reading, object);
   const auto last = static_cast<double>(table.nodes - 1);
-  const double nodes_per_nat = last / (table.last_log_odds - table.first_log_odds);
   // A node too many on either side leaves bounds true: rounding must not leave one out.
   constexpr double rounding = 1e-6;
   const auto node_after = [&](double log_odds, double spare) {
-    const double place = (log_odds - table.first_log_odds) * nodes_per_nat;
+    const double place = (log_odds - table.first_log_odds) * nodes_per_nat(table);
     return static_cast<std::size_t>(std::clamp(place, 0.0, last) + 1.0 + spare);
   };
   double highest = std::max(at(range.least), at(range.most));
