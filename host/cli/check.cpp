@@ -67,7 +67,7 @@ void check(const CheckArguments& options) {
   if (found.findings.empty()) {
     text += fmt::format("{} touches: nothing is wrong with the set-up\n", found.touches);
   }
-  give_result(options.json, json.dump(2) + "\n", text);
+  give_result(options.json, text_of(json, 2), text);
 }
 
 }  // namespace

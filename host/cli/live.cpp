@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -110,10 +111,8 @@ void live(const LiveArguments& options) {
   if (options.reset_after_s) {
     require_above("--reset-after", *options.reset_after_s, 0.0);
   }
-  std::optional<PlanGoal> goal;
-  if (!options.plan.empty()) {
-    goal = parse_goal("plan", options.plan);
-  }
+  const auto goal =
+      options.plan.empty() ? std::nullopt : std::optional(parse_goal("plan", options.plan));
   require_above("--tare", options.tare_s, 0.0, true);
   const Request request = complete(options.request);
   if (options.poses.empty() && options.sensor != "-" && !is_virtual_sensor(options.sensor)) {
@@ -168,7 +167,9 @@ void live(const LiveArguments& options) {
   std::FILE* const people = to_program ? stderr : stdout;
   const auto show = [people](const std::string& text) {
     fmt::print(people, "{}", text);
-    std::fflush(people);
+    if (std::fflush(people) != 0) {  // nobody reads it any more
+      throw std::system_error(errno, std::generic_category());
+    }
   };
   std::optional<LivePage> page;
   if (options.page.port) {
@@ -238,12 +239,8 @@ void live(const LiveArguments& options) {
                                 : "the board is back");
     }
     if (page) {
-      std::string finding;
-      {
-        const std::lock_guard lock(mutex);
-        finding = last_finding;
-      }
-      page->update(state, finding);
+      const std::lock_guard lock(mutex);
+      page->update(state, last_finding);
     }
   }
   if (page) {

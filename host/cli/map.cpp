@@ -110,6 +110,7 @@ void add_map_flags(CLI::App& command, MapFlags& flags) {
 }
 
 void build_maps(const MapFlags& flags) {
+  require_no_drawing_flags(flags);
   const std::vector<Recording> recordings = read_touch_recordings(flags.recordings);
   const MapTask task = map_task(flags, recordings);
   prepare_outputs(flags, task.names(), task.learns_sensor);
@@ -125,12 +126,7 @@ void build_maps(const MapFlags& flags) {
 }
 
 void make_maps(const MapFlags& flags) {
-  if (flags.of_drawings()) {
-    build_drawn_maps(flags);
-  } else {
-    require_no_drawing_flags(flags);
-    build_maps(flags);
-  }
+  flags.of_drawings() ? build_drawn_maps(flags) : build_maps(flags);
 }
 
 }  // namespace

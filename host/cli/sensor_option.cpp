@@ -43,6 +43,7 @@ TouchDetectorOptions detector_options(const DetectorFlags& flags, const std::str
   }
   options.release = flags.release.value_or(options.onset / 2.0);
   options.drift_s = flags.drift_s.value_or(options.drift_s);
+  const TouchDetector refuses(options, {}, {});  // before the sensor and files are opened
   return options;
 }
 

@@ -314,8 +314,9 @@ PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<T
       throw Error(
           Fault::input,
           fmt::format(
-              "likelihood table: none of {} touches can be compared with other "
-              "touches of its object; give at least two touches of one object, or a map of it",
+              "likelihood table: none of {} touches can be compared with other touches of its "
+              "object; "
+              "give at least two touches of one object, of two groups with `group`, or a map of it",
               presses.size()));
     }
     placed.table = table_of(count_placed(placed.placements, presses, layers, settings), settings);

@@ -147,6 +147,11 @@ LearnedMaps learn_unposed_maps(const MapTask& task, const std::function<void(dou
     learn_unposed_sensor(task, learned, work.part(count * sensor_cost));
   }
   std::vector<std::string> of_sensor = std::exchange(learned.words, {});
+  if (task.learns_sensor && !learned.sensor && !task.request.shared.threshold &&
+      task.recordings.front().pressure_unit == "raw") {
+    refuse(task.recordings.front().path, "{}; give `threshold`, which raw pressure then needs",
+           of_sensor.front());
+  }
   const std::optional<LearnedSensor>& sensor = task.learns_sensor ? learned.sensor : task.sensor;
   UnposedOptions options = unposed_options(task, sensor);
   for (std::size_t i = 0; i < task.objects.size(); ++i) {

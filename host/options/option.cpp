@@ -350,8 +350,10 @@ std::optional<char> separator_of(const Option& option) {
 
 Pose parse_pose(std::string_view option, const std::string& text) {
   const auto numbers = numbers_of<double, 3>(text, *separator<glm::dvec2>);
-  if (!numbers) {
-    refuse_option(option, text, "give it as X,Y,DEG, in mm and degrees");
+  if (!numbers ||
+      std::ranges::any_of(*numbers, [](double n) { return std::abs(n) > farthest_mm; })) {
+    refuse_option(option, text, "give it as X,Y,DEG, in mm and degrees, within +-{:g}",
+                  farthest_mm);
   }
   const auto [x, y, deg] = *numbers;
   return {{x, y}, deg * std::numbers::pi / 180.0};

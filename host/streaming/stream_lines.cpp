@@ -42,11 +42,13 @@ bool add_readings(const nlohmann::json& list, std::vector<double>& values, bool 
   });
 }
 
-/// The line with null in the place of the NaN that Python writes, which JSON does not know.
+/// The line with null in the place of the numbers that Python writes and JSON does not know.
 std::string without_nan(std::string_view line) {
   std::string text(line);
-  for (std::size_t at = text.find("NaN"); at != text.npos; at = text.find("NaN", at)) {
-    text.replace(at, 3, "null");
+  for (const std::string_view none : {"NaN", "-Infinity", "Infinity"}) {
+    for (std::size_t at = text.find(none); at != text.npos; at = text.find(none, at)) {
+      text.replace(at, none.size(), "null");
+    }
   }
   return text;
 }
@@ -202,7 +204,12 @@ FrameLines::Line FrameLines::read_header(const std::vector<std::string_view>& ce
 /// Finds what the columns of rows without a header hold, by the first row.
 std::optional<FrameLines::Flaw> FrameLines::find_columns(
     const std::vector<std::string_view>& cells) {
-  const std::size_t filled = cells.size() - (cells.back().empty() ? 1 : 0);
+  // An empty last cell is behind a separator that ends the row, or, with a time since 1970,
+  // Unknown.
+  const std::size_t more = cells.size() - std::min(cells.size(), elements_);
+  const bool is_reading =
+      (more == 1 || more == reading) && reading_in(cells.front()).value_or(0.0) > 1e8;
+  const std::size_t filled = cells.size() - (cells.back().empty() && !is_reading ? 1 : 0);
   const std::size_t before = of_poses() ? reading : filled - std::min(filled, elements_);
   if (filled < elements_ || (before > 1 && before != reading)) {
     return Flaw{Kind::malformed,

@@ -150,8 +150,10 @@ struct TouchDetector::Impl {
     }
     const double time_s = frame.host_time_s;
     std::optional<DetectedTouch> ended;
-    const double elapsed_s = last_s ? time_s - *last_s : 0.0;
+    double elapsed_s = last_s ? time_s - *last_s : 0.0;
     if (elapsed_s > options.largest_gap_s || elapsed_s < 0.0) {
+      // A press may have gone on; of what was untouched, the next frames tell the drift.
+      elapsed_s = touching ? 0.0 : std::min(elapsed_s, options.drift_s - options.smooth_s);
       ended = end_touch();
       rest.forget();
       smoother.reset();

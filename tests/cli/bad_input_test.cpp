@@ -43,6 +43,7 @@ TEST_F(BadInput, RecordingsWithoutTouchesOrAThreshold) {
     expect_refused(command + "stream.h5", {"stream.h5", "rows = frames", "palpate touches"});
     expect_refused(command + "raw.h5", {"raw.h5", "pressure_unit = raw", "give --threshold"});
   }
+  expect_refused("map raw.h5 -o new/ --unposed", {"raw.h5: no sensor model: it", "--threshold"});
   expect_refused("map silent.h5 -o new/ --png new.png", {"Contact"});
   expect_refused("map A.h5 raw.h5 -o out.map.h5 --threshold 2",
                  {"raw.h5", "pressure_unit", "a call for each"});

@@ -104,7 +104,7 @@ TEST(BadValue, TextsOfNumbersAndPosesAreReadWhole) {
   EXPECT_EQ(set_option(request, option_named("threshold"), "1e-323"), "") << "a subnormal";
   EXPECT_EQ(require_whole_number("0"), "");
   EXPECT_EQ(require_whole_number("10"), "");
-  for (const char* wrong : {"x", "1,2", "1,2,3,4", "1,2,x", "1,2,nan", "1;2;3"}) {
+  for (const char* wrong : {"x", "1,2", "1,2,3,4", "1,2,x", "1,2,nan", "1;2;3", "2e9,0,0"}) {
     expect_named(input_error([&] { parse_pose("object-pose", wrong); }), {"object-pose", wrong});
   }
 }

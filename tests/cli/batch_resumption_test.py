@@ -92,9 +92,9 @@ class Resumption(Batch):
         self.assertIn("cannot create a file in folder", read_only(*batch("r"), status=2).stderr)
 
     def test_with_other_flags_inputs_or_maps_is_refused(self) -> None:
-        gamma = ("--gamma is '0.2'", "not given", "another folder")
+        gamma = ("--gamma is '0.2', but was not given for its results", "another folder")
         self.assert_refused(batch("r", "--gamma", "0.2"), "r:", *gamma)
-        self.assert_refused(batch_of(["u"], "r", "--chunk", "4"), "--chunk is '4', its results are of '3'")
+        self.assert_refused(batch_of(["u"], "r", "--chunk", "4"), "--chunk is '4', but was '3' for its results")
         for more in (11, 12):
             shutil.copy(self.folder / name(0), self.folder / name(more))
         self.assert_refused(batch("r"), "r:", "13 inputs", "11")

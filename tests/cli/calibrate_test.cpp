@@ -122,6 +122,7 @@ TEST_F(CalibrateCommand, RefusesInOneLine) {
       {calibrate_ + "--bins 3x3", {"--bins"}},
       {calibrate_ + "--unposed --bins 9x9x9", {"known poses"}},
       {calibrate_ + "--unposed --pivot-mm auto", {"known poses"}},
+      {calibrate_ + "--group recording", {"likelihood table", "of two groups with --group"}},
       {calibrate_ + "--frames 0:25", {"A.h5: has 24 touches", "--frames 0:25"}},
       {calibrate_ + "--threshold 0", {"--threshold", "0"}},
       {calibrate_ + "--ratio 1", {"--ratio", "below 1"}},

@@ -302,7 +302,7 @@ class ClocksOfLogs(ImportTest):
         self.put({"log.csv": log, "poses.csv": poses})
 
     def findings(self) -> list[Any]:
-        found: list[Any] = json.loads(self.done("check", "t.h5", "--json", "-"))
+        found: list[Any] = json.loads(self.done("check", "t\udce9.h5", "--json", "-"))
         return found
 
     def test_that_differ_are_said_until_their_offset_is_given(self) -> None:
@@ -313,20 +313,20 @@ class ClocksOfLogs(ImportTest):
             "of 30 presses the array moves, is lifted, or has no pose; with --pose-delay 0.6",
         )  # fmt: skip
         self.assert_named(
-            self.done("touches", "o.h5", "-o", "t.h5"),
+            self.done("touches", "o.h5", "-o", "t\udce9.h5"),
             " left out as not steady, clocks differ (palpate import --pose-delay 0.6",
         )
-        self.assert_named(self.palpate("map", "t.h5", "-o", "m.h5").stderr, "t.h5: the poses' clock seems")
+        self.assert_named(self.palpate("map", "t\udce9.h5", "-o", "m.h5").stderr, "h5: the poses' clock seems")
         *_, clock, dropped = self.findings()
         self.assertEqual((clock["what"], dropped["what"], dropped["nats"]), ("clock", "dropped", 0))
         self.assertGreater(clock["nats"], 20)
         self.assertTrue(clock["flag"].startswith("--pose-delay 0.6"), clock)
         self.assertEqual(dropped["flag"], clock["flag"])
-        self.assert_named(clock["words"], "t.h5: the poses' clock seems")
+        self.assert_named(clock["words"], "t\ufffd.h5: the poses' clock seems")
         self.assert_named(dropped["words"], "; the clocks differ: import with ")
         self.assertIn("ahead", self.warned(flags + " --pose-delay 0.2"))
         self.said(flags + " --pose-delay 0.62")
-        self.assertIn("30 touches in ", self.done("touches", "o.h5", "-o", "t.h5"))
+        self.assertIn("30 touches in ", self.done("touches", "o.h5", "-o", "t\udce9.h5"))
         self.assertFalse({"clock", "dropped"} & {found["what"] for found in self.findings()})
         self.put_logs(-3600.3)
         self.assert_refused(self.arguments(WITH_POSES), "poses.csv", "finds a pose", "their offset but for 1.05 s",

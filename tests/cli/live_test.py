@@ -197,9 +197,9 @@ class Live(PreparedTest, StreamTest):
             (live("nothing", "--poses", "-"), "nothing"),
             (live("replay:A.h5"), "A.h5", "rows"),
             (["live", "--sensor", UNKNOWN_E], "--maps", "missing"),
-            (["live", "--maps", "maps"], "--sensor"),
             (live(UNKNOWN_E, "--reset-after", "0"), "--reset-after"),
             (live(UNKNOWN_E, "--tare", "-1"), "--tare"),
+            (live(UNKNOWN_E, "--json", "new.jsonl", "--steady", "2"), "steady = 2"),
             (live(UNKNOWN_E, "--json", "no/such.jsonl"), "--json", "no/such.jsonl"),
             (live("-"), "--array", "COLUMNS:ROWS:PITCH"),
             (live("-", *array, "--poses", "-"), "--poses -", "--sensor -", "x_mm"),
@@ -211,6 +211,7 @@ class Live(PreparedTest, StreamTest):
         self.assert_named(wrong, "standard input, line 1", "3 numbers", "36 elements")
         self.assertEqual(wrong.count("\n"), 1, wrong)
 
-    def test_says_where_a_line_cannot_be_written(self) -> None:
-        full = self.palpate(*live(UNKNOWN_E, "--json", "/dev/full"), status=1)
-        self.assertIn("/dev/full", full.stderr)
+    def test_ends_where_a_line_cannot_be_written(self) -> None:
+        endless, full = live("simulate:A,speed=max"), lambda: os.dup2(os.open("/dev/full", os.O_WRONLY), 1)
+        self.assertIn("/dev/full", self.palpate(*endless, "--json", "/dev/full", status=1).stderr)
+        self.assertIn("standard output", self.palpate(*endless, status=1, preexec_fn=full).stderr)

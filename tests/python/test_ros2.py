@@ -243,6 +243,11 @@ def test_the_node_publishes_what_it_finds(
     at = pose.pose.pose.position
     assert (at.x, at.y, at.z) == pytest.approx((*T_ROBOT_OBJECT[:2] / 1000, 0.1), abs=1e-3)
     assert node.next_unknown(None, SimpleNamespace()).message == "forgot 4 touches"
+    node.session.options["threshold"] = 1e3  # which no reading reaches
+    for frame in frames:
+        node.now_s = frame.host_time_s
+        node.take(message_of(frame))
+    assert "no touch has an element in contact" in node.said[-1]
     message = message_of(frames[0])
     message.data = message.data[:35]
     node.take(message)

@@ -137,7 +137,7 @@ TEST(TouchDetector, EndlessTouchKeepsABoundedPartAndIsTheMeanOverAllOfIt) {
 
 TEST(TouchDetector, SilenceAndAClockThatGoesBackEndATouch) {
   const auto held = [](double t) { return std::vector<double>{8.0 * press(t, 0.5, 1e6)}; };
-  for (const double jump_s : {3.0, -3.0}) {
+  for (const double jump_s : {3.0, 3600.0, -3.0}) {
     std::vector<Frame> frames = PressStream{}.frames(4.0, held);
     for (std::size_t i = 200; i < frames.size(); ++i) {
       frames[i].host_time_s += jump_s;
@@ -147,6 +147,14 @@ TEST(TouchDetector, SilenceAndAClockThatGoesBackEndATouch) {
     EXPECT_LT(touches[0].end_s, frames[200].host_time_s + (jump_s < 0.0 ? 10.0 : 0.0));
     EXPECT_GE(touches[1].begin_s, frames[200].host_time_s);
   }
+  // Of what is not touched meanwhile, a single frame does not tell the rest.
+  std::vector<double> part(100, 0.0);
+  part[0] = 9.0;
+  std::vector<Frame> late = PressStream{.noise = 0.7}.frames(8.0, presses_of(part));
+  for (std::size_t i = 400; i < late.size(); ++i) {
+    late[i].host_time_s += 60.0;
+  }
+  EXPECT_EQ(touches_in(late).size(), 8u);
 }
 
 TEST(TouchDetector, DeadElementsTakeNoPart) {

@@ -85,6 +85,8 @@ class Recognise(Node):  # type: ignore[misc]  # of rclpy, which mypy may not fin
         transform = self.tf.lookup_transform(self.base, self.sensor_frame, middle, patience)
         T_robot_sensor, z_m = planar_pose(transform.transform)
         record = self.session.recognise(touch, T_robot_sensor)
+        if "fit" not in record:
+            raise palpate.Error("no touch has an element in contact; press harder, or give a lower threshold")
         probability = record.identity[record.best]
         self.get_logger().info(
             f"touch {self.session.touches}: {record.best} with probability {probability:.3f}, "

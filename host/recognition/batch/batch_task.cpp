@@ -280,7 +280,7 @@ std::string difference_of_tasks(const BatchTask& before, const BatchTask& now) {
   }
   const auto [old, asked] = std::pair(asked_of(before), asked_of(now));
   if (const auto option = first_difference(old, asked)) {
-    return fmt::format("`{}` is {}, its results are of {}", *option, value_of(asked, *option),
+    return fmt::format("`{}` is {}, but was {} for its results", *option, value_of(asked, *option),
                        value_of(old, *option));
   }
   if (const auto file = first_difference(before.files, now.files)) {

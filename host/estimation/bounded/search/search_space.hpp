@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -45,8 +46,8 @@ class Deadline {
                     const std::function<void()>* cancel_point = nullptr)
       : cancel_point_(cancel_point) {
     if (budget_s) {
-      at_ = Clock::now() +
-            std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(*budget_s));
+      const std::chrono::duration<double> left(std::min(*budget_s, 1e9));  // which the clock counts
+      at_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(left);
     }
   }
   bool exists() const { return at_.has_value(); }
