@@ -84,10 +84,10 @@ std::vector<float> PressPlacer::log_likelihoods(std::span<const TouchEvidence> p
     add(elements, none, rest_);
   }
   std::vector<float> bins = rest_;
-  const auto excess = [&](Reading reading) -> const std::vector<float>* {
+  const auto excess = [&contact = contact_excess_, &unknown = unknown_excess_](Reading reading) {
     return reading == Reading::no_contact ? nullptr
-           : is_contact(reading)          ? &contact_excess_[static_cast<std::size_t>(reading) - 1]
-                                          : &unknown_excess_;
+           : is_contact(reading)          ? &contact[static_cast<std::size_t>(reading) - 1]
+                                          : &unknown;
   };
   add(elements, excess, bins);
   return bins;

@@ -32,8 +32,7 @@ def rows(tmp_path_factory: pytest.TempPathFactory, small: pytest.MonkeyPatch) ->
     small.setitem(accuracy.SCENARIOS, "strangers", few)
     scenarios = ("other-gains", "misplaced-2mm", "fit", "strangers", "planned")
     folder = tmp_path_factory.mktemp("accuracy")
-    command = ("--palpate", os.environ["PALPATE_COMMAND"])
-    found: Rows = Program(folder, "bench.accuracy", "--quick", *scenarios, *command).document["accuracy"]
+    found: Rows = Program(folder, "bench.accuracy", "--quick", *scenarios).document["accuracy"]
     return found
 
 

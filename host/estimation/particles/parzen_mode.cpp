@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <compare>
 #include <functional>
 #include <numbers>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include <glm/vec4.hpp>
@@ -38,7 +39,10 @@ struct Key {
   int y = 0;
   int x = 0;
 
-  friend auto operator<=>(const Key&, const Key&) = default;
+  bool operator==(const Key&) const = default;
+  bool operator<(const Key& other) const {
+    return std::tie(object, sector, y, x) < std::tie(other.object, other.sector, other.y, other.x);
+  }
 };
 
 int cell_of(float mm) {
@@ -79,7 +83,7 @@ SortedParticles sort(std::span<const shaders::Particle> particles,
                        static_cast<std::uint32_t>(i)});
     }
   }
-  std::ranges::stable_sort(order, {}, [](const auto& of) { return of.first; });
+  std::ranges::stable_sort(order, std::less(), [](const auto& of) { return of.first; });
   double mass = 0.0;
   for (const auto& [cell, i] : order) {
     const double weight = weights[i] / sorted.largest;
@@ -110,7 +114,7 @@ std::vector<Key> reached_tiles(const SortedParticles& sorted) {
     }
   }
   const auto make_unique = [](std::vector<Key>& keys) {
-    std::ranges::sort(keys);
+    std::sort(keys.begin(), keys.end());
     keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   };
   make_unique(occupied);
@@ -131,7 +135,7 @@ std::vector<Key> reached_tiles(const SortedParticles& sorted) {
 
 Tile gather(const SortedParticles& sorted, const Key& key) {
   const auto first_of = [&sorted](const Key& cell) {
-    return static_cast<std::uint32_t>(std::ranges::lower_bound(sorted.cell, cell) -
+    return static_cast<std::uint32_t>(std::ranges::lower_bound(sorted.cell, cell, std::less()) -
                                       sorted.cell.begin());
   };
   Tile tile{.key = key, .ranges = {}};
