@@ -126,7 +126,11 @@ void build_maps(const MapFlags& flags) {
 }
 
 void make_maps(const MapFlags& flags) {
-  flags.of_drawings() ? build_drawn_maps(flags) : build_maps(flags);
+  if (flags.of_drawings()) {
+    build_drawn_maps(flags);
+  } else {
+    build_maps(flags);
+  }
 }
 
 }  // namespace

@@ -311,13 +311,10 @@ PlacedPresses learn_table(const std::vector<Press>& presses, const std::vector<T
   for (int round = 0; round < rounds; ++round) {
     placed.placements = place_all(presses, evidence, maps, layers, settings, placed.table, counter);
     if (placed.placements.empty()) {
-      throw Error(
-          Fault::input,
-          fmt::format(
-              "likelihood table: none of {} touches can be compared with other touches of its "
-              "object; "
-              "give at least two touches of one object, of two groups with `group`, or a map of it",
-              presses.size()));
+      refuse("likelihood table",
+             "none of {} touches can be compared with other touches of its object; give at least "
+             "two touches of one object, of two groups with `group`, or a map of it",
+             presses.size());
     }
     placed.table = table_of(count_placed(placed.placements, presses, layers, settings), settings);
   }

@@ -46,11 +46,12 @@ struct PosedSensor::Impl {
 
   Impl(std::unique_ptr<Sensor> inner, const std::string& name, double largest_gap_s,
        const Warn& warn)
-      : sensor((held_by(inner, "sensor"), std::move(inner))),
+      : sensor(std::move(inner)),
         track(largest_gap_s),
         flaws(warn ? Warn([warn](const std::string& text) { warn("poses " + text); }) : warn),
         lines("poses", name, longest_line,
               [this](const LineReader::Line& line) { take_line(line); }) {
+    held_by(sensor, "sensor");  // throws where there is none
     while (lines.is_file() && read_block()) {
     }
   }
