@@ -89,7 +89,7 @@ Touch Recording::touch(std::size_t i) const {
 
 std::vector<Touch> Recording::touches(std::size_t begin, std::size_t end) const {
   std::vector<Touch> views;
-  views.reserve(size());
+  views.reserve(std::min(end - begin, size()));
   for (std::size_t i = begin; i < end; ++i) {
     views.push_back(touch(i));
   }
