@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <set>
 #include <tuple>
@@ -176,8 +177,13 @@ MapsByFolds maps_by_folds(const std::vector<Press>& presses, const MapOptions& o
     of_label[presses[i].label].push_back(i);
   }
   MapsByFolds maps;
-  for (const auto& [key, own] : of_label) {
-    const std::string& label = key;  // for clang, whose lambdas capture no structured binding
+  for (auto& [label, own] : of_label) {
+    maps.of_objects.push_back({{.label = label}, std::move(own)});
+  }
+  std::vector<std::vector<TrainingMap>> without(maps.of_objects.size());
+  tbb::parallel_for(std::size_t{0}, maps.of_objects.size(), [&](std::size_t object) {
+    OccupancyGrid& map = maps.of_objects[object].map;
+    const std::vector<std::size_t>& own = maps.of_objects[object].presses;
     std::vector<Touch> touches;
     std::vector<std::size_t> part;
     for (const std::size_t press : own) {
@@ -186,15 +192,19 @@ MapsByFolds maps_by_folds(const std::vector<Press>& presses, const MapOptions& o
           *presses[press].T_object_robot * touches.back().T_robot_sensor;
       part.push_back(fold[press]);
     }
-    ObservedMaps built = named(label, [&] { return observed_maps(touches, part, options, label); });
-    maps.of_objects.push_back({std::move(built.all), own});
+    ObservedMaps built =
+        named(map.label, [&] { return observed_maps(touches, part, options, map.label); });
+    map = std::move(built.all);
     for (const std::size_t k : std::set(part.begin(), part.end())) {
       if (!built.without[k].log_odds.empty()) {
         TrainingMap& others =
-            maps.without_folds.emplace_back(TrainingMap{std::move(built.without[k]), own});
+            without[object].emplace_back(TrainingMap{std::move(built.without[k]), own});
         std::erase_if(others.presses, [&](std::size_t press) { return fold[press] == k; });
       }
     }
+  });
+  for (std::vector<TrainingMap>& own : without) {
+    std::ranges::move(own, std::back_inserter(maps.without_folds));
   }
   return maps;
 }
