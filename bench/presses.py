@@ -39,6 +39,13 @@ def together(records: Sequence[Json]) -> dict[str, float]:
     return dict(zip(labels, (p / p.sum()).tolist(), strict=True))
 
 
+def region_of(pitch_mm: float) -> Any:
+    """Where an object may lie, as recognize() takes it, on bins of one pitch."""
+    widest_mm = (REACH + 0.5) * pitch_mm
+    bins = (2 * REACH + 1, 2 * REACH + 1, TURNS)
+    return {"x_mm": (-widest_mm, widest_mm), "y_mm": (-widest_mm, widest_mm), "bins": bins}
+
+
 def scores(records: Sequence[Json], presses: int, random: numpy.random.Generator) -> Json:
     """Scores of as many unknowns as there are presses: each with others of its object, drawn without
     replacement."""
@@ -79,9 +86,7 @@ def program() -> None:
     learned, tried = ([recording[start::2] for recording in recordings] for start in (0, 1))
     document: Json = {}
     rows: list[Json] = []
-    widest = (REACH + 0.5) * pitch_of(recordings[0].elements_mm)
-    region: Any = {"x_mm": (-widest, widest), "y_mm": (-widest, widest)}
-    region |= {"filter": "histogram", "bins": (2 * REACH + 1, 2 * REACH + 1, TURNS)}
+    region = region_of(pitch_of(recordings[0].elements_mm))
     raw = recordings[0].pressure_unit == "raw"
     contact = {"threshold": CLASSIFIER.threshold, "ratio": CLASSIFIER.ratio} if raw else {}
     models: Any = (("eq7", "Eq. 7", {**contact, "sensor_model": "none"}), ("learned", "learned", {}))
@@ -89,7 +94,7 @@ def program() -> None:
         with tempfile.TemporaryDirectory() as maps:
             palpate.learn_maps(learned, maps, unposed=True, **model)
             records = palpate.recognize(
-                tried, maps, each_frame=True, none=0.0, device=device, **region, **model
+                tried, maps, each_frame=True, none=0.0, filter="histogram", device=device, **region, **model
             )
         random = numpy.random.default_rng(SEED)
         of_sensor = [scores(records, presses, random) for presses in TOGETHER]

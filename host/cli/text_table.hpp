@@ -23,7 +23,7 @@ std::string percent(double share);
 std::string range_words(const Interval& interval);
 /// A count with its noun: "1 record", "2 records".
 std::string count_of(std::size_t count, const char* one, const char* more);
-/// ", 12 lost" of what there is some; "" of what there is none.
+/// ", 12 lost", or nothing where the count is 0.
 std::string also(std::uint64_t count, const char* words);
 
 /// A table for people. Every column is as wide as its longest cell; a column without any content is

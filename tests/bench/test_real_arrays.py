@@ -12,7 +12,7 @@ from bench import contact_learning
 from bench.contact_array import AS_BUILT, COLUMNS, PITCH_MM, PIXEL_MM, ROWS, WINDOW
 from bench.contact_array import Press, Registration, Shifts, read_presses, touched
 from bench.contact_learning import Learned, Learning, PoseErrors, Settings
-from bench.presses import scores, together
+from bench.presses import region_of, scores, together
 
 SHIFT_MM = numpy.array([1.5, -1.0])  # of the readings beside the contact
 
@@ -194,6 +194,13 @@ def test_presses_of_one_object_add_up() -> None:
     random = numpy.random.default_rng(5)
     assert scores([weak, strong, wrong], 1, random)["recognised"]["mean"] == pytest.approx(2 / 3)
     assert scores([weak, strong, wrong], 3, random)["recognised"]["mean"] == 1.0
+
+
+def test_presses_are_told_apart_by_bins_of_a_pitch_and_ten_degrees() -> None:
+    region = region_of(1.9)
+    for (lower, upper), bins in zip((region["x_mm"], region["y_mm"]), region["bins"], strict=False):
+        assert (upper - lower) / bins == pytest.approx(1.9) and -lower == upper > 14 * 1.9
+    assert 360.0 / region["bins"][2] == 10.0
 
 
 def test_objects_pressed_anywhere_are_recognised(tmp_path: pathlib.Path) -> None:
